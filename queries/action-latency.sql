@@ -1,4 +1,3 @@
--- name: action-latency
 -- title: Latency of actions by action and client
 -- description: How long goals of actions took, and by part: until the client had the answer, until
 --     the first feedback, until the server had and sent the result, until the client had that.
@@ -46,17 +45,13 @@
 -- column: loss_affected BIGINT       Goals with a gap of a trace while they lasted
 -- column: action_server_id BIGINT    Identity of the action server
 -- column: action_client_id BIGINT    Identity of the action client
--- brief: action_name, client, result_median_ns, result_p99_ns, result_max_ns, goals,
---     loss_affected, result_p95_ns, accepted, rejected, finished, cancelled, server,
---     accept_median_ns, first_feedback_median_ns, execution_median_ns, not_answered, doubtful,
---     overlapping
+-- brief: action_name, client, result_median_ns, result_p99_ns, result_max_ns, goals, loss_affected,
+--     result_p95_ns, accepted, rejected, finished, cancelled, server, accept_median_ns,
+--     first_feedback_median_ns, execution_median_ns, not_answered, doubtful, overlapping
 -- note: goals
 WITH measured AS (
     SELECT
-        run_id,
-        action_name,
-        action_server_id,
-        action_client_id,
+        run_id, action_name, action_server_id, action_client_id,
         count(*) AS goals,
         count(*) FILTER (is_accepted) AS accepted,
         count(*) FILTER (NOT is_accepted) AS rejected,
@@ -80,20 +75,11 @@ WITH measured AS (
     GROUP BY run_id, action_name, action_server_id, action_client_id
 )
 SELECT
-    m.run_id,
-    m.action_name,
+    m.run_id, m.action_name,
     main.node_label(sn.full_name, sp.name, sp.pid) AS server,
     main.node_label(cn.full_name, cp.name, cp.pid) AS client,
-    m.goals,
-    m.accepted,
-    m.rejected,
-    m.not_answered,
-    m.asked,
-    m.finished,
-    m.cancelled,
-    m.doubtful,
-    m.overlapping,
-    m.feedback,
+    m.goals, m.accepted, m.rejected, m.not_answered, m.asked, m.finished, m.cancelled, m.doubtful,
+    m.overlapping, m.feedback,
     m.accept[1] AS accept_median_ns,
     m.accept[2] AS accept_p95_ns,
     m.accept[3] AS accept_p99_ns,
@@ -112,9 +98,7 @@ SELECT
     m.result[3] AS result_p95_ns,
     m.result[4] AS result_p99_ns,
     m.result[5] AS result_max_ns,
-    m.loss_affected,
-    m.action_server_id,
-    m.action_client_id
+    m.loss_affected, m.action_server_id, m.action_client_id
 FROM measured AS m
 LEFT JOIN main.service AS s ON m.action_server_id = s.service_id
 LEFT JOIN main.process AS sp ON s.process_id = sp.process_id

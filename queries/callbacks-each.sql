@@ -1,4 +1,3 @@
--- name: callbacks-each
 -- title: Callback instances, one by one, the longest first
 -- description: Each execution of a callback: when it began, how long it ran and on which thread,
 --     which message it was called with, and what it published meanwhile. Instances that never ended
@@ -56,24 +55,12 @@ published AS (
     GROUP BY callback_instance_id
 )
 SELECT
-    i.run_id,
-    i.start_ns,
-    i.duration_ns,
-    s.running_ns,
-    s.preempted_ns,
-    l.node,
-    l.label AS callback,
+    i.run_id, i.start_ns, i.duration_ns, s.running_ns, s.preempted_ns, l.node, l.label AS callback,
     p.topics AS published,
     coalesce(p.number, 0) AS publications,
     printf('%s %d', coalesce(r.name, '?'), r.pid) AS process,
-    t.tid,
-    h.hostname AS host,
-    i.depth,
-    i.take_id,
-    i.is_loss_affected,
-    i.callback_instance_id,
-    i.callback_id,
-    l.is_internal
+    t.tid, h.hostname AS host, i.depth, i.take_id, i.is_loss_affected, i.callback_instance_id,
+    i.callback_id, l.is_internal
 FROM instance AS i
 JOIN main.callback_label AS l ON i.callback_id = l.callback_id
 JOIN main.process AS r ON i.process_id = r.process_id

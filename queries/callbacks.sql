@@ -1,4 +1,3 @@
--- name: callbacks
 -- title: Callback durations and periods
 -- description: How long callbacks ran, and how far apart their starts were. Instances without an
 --     end are counted separately. Where the kernel was traced, CPU time and the time without a CPU
@@ -36,16 +35,12 @@
 -- note: callbacks
 WITH instance AS (
     SELECT
-        i.run_id,
-        k.alike_id AS callback_id,
-        k.objects,
-        i.start_ns,
+        i.run_id, k.alike_id AS callback_id, k.objects, i.start_ns,
         i.end_ns - i.start_ns AS duration_ns,
         i.start_ns - lag(i.start_ns) OVER (
             PARTITION BY i.callback_id ORDER BY i.start_ns, i.callback_instance_id
         ) AS period_ns,
-        s.running_ns,
-        s.preempted_ns
+        s.running_ns, s.preempted_ns
     FROM main.callback_instance AS i
     JOIN main.callback_alike AS k ON i.callback_id = k.callback_id
     LEFT JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
@@ -53,8 +48,7 @@ WITH instance AS (
 ),
 measured AS (
     SELECT
-        run_id,
-        callback_id,
+        run_id, callback_id,
         any_value(objects) AS objects,
         count(*) AS count,
         count(*) - count(duration_ns) AS open,
@@ -74,35 +68,22 @@ measured AS (
     GROUP BY run_id, callback_id
 )
 SELECT
-    m.run_id,
-    l.node,
-    l.label AS callback,
-    m.objects,
-    m.count,
-    m.open,
+    m.run_id, l.node, l.label AS callback, m.objects, m.count, m.open,
     CASE WHEN
             2 * m.span_ns >= coalesce(
                 r.end_ns + least(0, $end_ns - r.end_ns) - greatest(r.start_ns, $start_ns), 0
             )
             THEN (m.count - 1) * 1e9 / nullif(m.span_ns, 0)
     END AS rate_hz,
-    m.period_min_ns,
-    m.period_median_ns,
-    m.period_max_ns,
-    m.min_ns,
+    m.period_min_ns, m.period_median_ns, m.period_max_ns, m.min_ns,
     m.quantiles[1] AS median_ns,
     m.mean_ns,
     m.quantiles[2] AS p95_ns,
     m.quantiles[3] AS p99_ns,
-    m.max_ns,
-    m.total_ns,
+    m.max_ns, m.total_ns,
     m.running[1] AS running_median_ns,
     m.running[2] AS running_p99_ns,
-    m.preempted_p99_ns,
-    m.preempted_ns,
-    c.symbol,
-    m.callback_id,
-    l.is_internal
+    m.preempted_p99_ns, m.preempted_ns, c.symbol, m.callback_id, l.is_internal
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 JOIN main.run AS r ON m.run_id = r.run_id

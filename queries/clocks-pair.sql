@@ -1,4 +1,3 @@
--- name: clocks-pair
 -- title: Messages and packets by which clocks are corrected
 -- description: Messages and network packets between hosts of two clocks, for each direction, with
 --     the shortest delay of each after the current correction. A correction needs both directions;
@@ -13,21 +12,15 @@
 --     ends
 -- column: shortest_message_ns BIGINT [ns]     Shortest delay of a message, after correction
 -- column: shortest_packet_ns BIGINT [ns]      Shortest delay of a packet, after correction
--- brief: from_hosts, to_hosts, message_count, shortest_message_ns, packet_count,
---     shortest_packet_ns
+-- brief: from_hosts, to_hosts, message_count, shortest_message_ns, packet_count, shortest_packet_ns
 WITH named AS (
     SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts
     FROM main.host
     GROUP BY clock_id
 )
 SELECT
-    p.run_id,
-    f.hosts AS from_hosts,
-    t.hosts AS to_hosts,
-    p.message_count,
-    p.packet_count,
-    p.shortest_message_ns,
-    p.shortest_packet_ns
+    p.run_id, f.hosts AS from_hosts, t.hosts AS to_hosts, p.message_count, p.packet_count,
+    p.shortest_message_ns, p.shortest_packet_ns
 FROM main.clock_pair AS p
 LEFT JOIN named AS f ON p.from_clock_id = f.clock_id
 LEFT JOIN named AS t ON p.to_clock_id = t.clock_id

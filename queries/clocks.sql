@@ -1,4 +1,3 @@
--- name: clocks
 -- title: Clocks and how they are corrected
 -- description: The clocks of a run, the hosts that have them, and how their times are corrected.
 --     Times of clocks with the same reference can be compared, to within the sum of their
@@ -30,8 +29,7 @@ WITH named AS (
     GROUP BY clock_id
 )
 SELECT
-    c.run_id,
-    n.hosts,
+    c.run_id, n.hosts,
     CASE
         WHEN c.method = 'none' AND c.clock_id IN (
             SELECT o.reference_clock_id
@@ -41,11 +39,7 @@ SELECT
         ELSE c.method
     END AS method,
     r.hosts AS reference,
-    c.offset_ns,
-    c.uncertainty_ns,
-    c.drift_ppb,
-    c.drift_uncertainty_ppb,
-    c.reference_ns,
+    c.offset_ns, c.uncertainty_ns, c.drift_ppb, c.drift_uncertainty_ppb, c.reference_ns,
     coalesce(k.greatest_ns, c.uncertainty_ns) AS greatest_uncertainty_ns,
     c.uuid
 FROM main.clock AS c

@@ -1,4 +1,3 @@
--- name: critical-path
 -- title: What the slowest flows waited for
 -- description: The slowest flows, piece by piece; of one message: msgflow flow --why. Waits are
 --     replaced by what they waited for, as far as the trace shows; where the kernel was traced,
@@ -17,8 +16,7 @@
 -- param: take BIGINT = NULL  Instead, the longest flow to this take_id; on the command line:
 --     msgflow flow --take ID --why
 -- param: case
--- param: by VARCHAR {piece|node|part} = 'piece'  Rows by piece, by node, or by activity
---     and state
+-- param: by VARCHAR {piece|node|part} = 'piece'  Rows by piece, by node, or by activity  and state
 -- param: detail VARCHAR {short|full} = 'short'  full: every piece and layer of publishing
 -- param: from_event, to_event, max_depth, max_paths
 -- column: run_id
@@ -84,8 +82,7 @@ CREATE OR REPLACE TEMP TABLE critical_flow AS
 WITH path AS (
     SELECT path_id
     FROM named_path
-    WHERE ($via IS NOT NULL OR $without IS NOT NULL)
-        AND main.path_visits(path, $via, $without)
+    WHERE ($via IS NOT NULL OR $without IS NOT NULL) AND main.path_visits(path, $via, $without)
 )
 SELECT
     flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
@@ -138,15 +135,10 @@ reader AS (
 ),
 piece AS (
     SELECT
-        c.run_id,
-        c.flow_rank,
-        c.position,
+        c.run_id, c.flow_rank, c.position,
         c.from_ns - min(CASE WHEN c.position = 1 THEN c.from_ns END)
             OVER (PARTITION BY c.flow_rank) AS at_ns,
-        c.duration_ns,
-        c.hop,
-        c.part,
-        c.activity,
+        c.duration_ns, c.hop, c.part, c.activity,
         CASE
             WHEN c.activity = 'network_or_idle'
                 AND coalesce(c.state, 'unknown') IN ('sleeping', 'unknown')
@@ -164,15 +156,8 @@ piece AS (
             WHEN c.request_id IS NOT NULL THEN printf('Service(%s)', v.service_name)
             ELSE coalesce(p.topic_name, s.topic_name, '?')
         END AS what,
-        c.is_certain,
-        c.from_ns,
-        c.callback_instance_id,
-        c.publication_id,
-        c.take_id,
-        c.latency_ns,
-        c.path_id,
-        c.state,
-        c.wakers,
+        c.is_certain, c.from_ns, c.callback_instance_id, c.publication_id, c.take_id, c.latency_ns,
+        c.path_id, c.state, c.wakers,
         printf('%s %d', coalesce(t.name, '?'), t.tid) AS thread,
         c.priority,
         CASE
@@ -211,8 +196,7 @@ piece AS (
     LEFT JOIN main.publication AS b ON c.message_id = b.publication_id
     LEFT JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
     -- Who waits for a message is the node that takes it, with a traced callback or without.
-    LEFT JOIN reader AS w
-        ON c.part = 'publish_to_take' AND c.path_id = w.path_id AND c.hop = w.hop
+    LEFT JOIN reader AS w ON c.part = 'publish_to_take' AND c.path_id = w.path_id AND c.hop = w.hop
     LEFT JOIN main.subscription AS s ON w.subscription_id = s.subscription_id
     LEFT JOIN main.process AS r ON coalesce(s.process_id, b.process_id) = r.process_id
     LEFT JOIN main.node AS n ON CASE WHEN s.subscription_id IS NULL THEN p.node_id ELSE s.node_id
@@ -251,8 +235,7 @@ sorted AS (
 ),
 summed AS MATERIALIZED (
     SELECT
-        run_id,
-        flow_rank,
+        run_id, flow_rank,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(at_ns) END AS at_ns,
         sum(duration_ns)::BIGINT AS duration_ns,
         CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(hop) END AS hop,
@@ -285,10 +268,7 @@ summed AS MATERIALIZED (
         CASE
             WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(publication_id)
         END AS publication_id,
-        take_id,
-        latency_ns,
-        path_id,
-        row_key,
+        take_id, latency_ns, path_id, row_key,
         min(position) AS position
     FROM sorted
     GROUP BY run_id, flow_rank, take_id, latency_ns, path_id, row_key
@@ -312,29 +292,9 @@ doubted AS (
     FROM critical_flow
 )
 SELECT
-    s.run_id,
-    s.flow_rank AS rank,
-    s.at_ns,
-    s.duration_ns,
-    s.hop,
-    s.part,
-    s.activity,
-    s.state,
-    s.who,
-    s.node,
-    s.what,
-    s.share,
-    s.pieces,
-    s.is_certain,
-    s.thread,
-    s.wakers,
-    s.priority,
-    s.who_priority,
-    s.from_ns,
-    s.callback_instance_id,
-    s.publication_id,
-    s.take_id,
-    s.latency_ns,
+    s.run_id, s.flow_rank AS rank, s.at_ns, s.duration_ns, s.hop, s.part, s.activity, s.state,
+    s.who, s.node, s.what, s.share, s.pieces, s.is_certain, s.thread, s.wakers, s.priority,
+    s.who_priority, s.from_ns, s.callback_instance_id, s.publication_id, s.take_id, s.latency_ns,
     -- The path of a flow of a thousand hops is long: only the first of its rows has it.
     CASE WHEN s.place = 1 THEN d.is_ambiguous END AS is_ambiguous,
     CASE

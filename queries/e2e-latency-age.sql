@@ -1,4 +1,3 @@
--- name: e2e-latency-age
 -- title: Data age by path
 -- description: How old the data behind the output of a path are. The age of an output (the end of
 --     the path) is that of the newest input (start of a flow) that it reflects. Data stay in use
@@ -39,12 +38,9 @@ FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $m
 
 WITH output AS (
     SELECT
-        path_id,
-        sink_event,
-        sink_ns,
+        path_id, sink_event, sink_ns,
         sink_ns - root_ns AS age_ns,
-        is_loss_affected,
-        is_ambiguous,
+        is_loss_affected, is_ambiguous,
         lead(sink_ns) OVER (PARTITION BY path_id ORDER BY sink_ns, take_id) - root_ns AS peak_ns
     FROM main.end_to_end(
         $runs, $from, $to, $from_event, $to_event,
@@ -86,11 +82,7 @@ SELECT
     m.max_ns,
     m.peaks[1] AS peak_median_ns,
     m.peaks[2] AS peak_p95_ns,
-    m.peak_max_ns,
-    m.time_mean_ns,
-    m.sink_event,
-    p.is_cut,
-    p.path
+    m.peak_max_ns, m.time_mean_ns, m.sink_event, p.is_cut, p.path
 FROM main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p
 LEFT JOIN measured AS m ON p.path_id = m.path_id
 ORDER BY p.run_id, p.path, p.path_id

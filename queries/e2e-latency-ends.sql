@@ -1,4 +1,3 @@
--- name: e2e-latency-ends
 -- title: End-to-end latency between two topics
 -- description: How long it took from the start of a flow (as for e2e-latency) to its end at a node,
 --     over all paths between the topic of its first message and that of its last one. The first
@@ -124,11 +123,7 @@ ends AS (
     GROUP BY ALL
 )
 SELECT
-    n.run_id,
-    n.first_topic,
-    n.last_topic,
-    n.node,
-    n.paths,
+    n.run_id, n.first_topic, n.last_topic, n.node, n.paths,
     coalesce(m.roots, 0) AS roots,
     coalesce(m.number['reached'], 0) AS reached,
     coalesce(m.number['superseded'], 0) AS superseded,
@@ -163,8 +158,7 @@ SELECT
     m.newest_mean_ns,
     m.newests[2] AS newest_p95_ns,
     m.newests[3] AS newest_p99_ns,
-    m.newest_max_ns,
-    n.is_cut
+    m.newest_max_ns, n.is_cut
 FROM ends AS n
 LEFT JOIN measured AS m
     ON n.run_id = m.run_id

@@ -1,4 +1,3 @@
--- name: e2e-latency-reaction
 -- title: Reaction time by path
 -- description: How long it takes at most until something that happens shows at the end of a path.
 --     What happens right after an input (the start of a flow) is seen by the next input at the
@@ -32,9 +31,7 @@ FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $m
 
 WITH input AS (
     SELECT
-        path_id,
-        root_kind,
-        root_id,
+        path_id, root_kind, root_id,
         any_value(root_ns) AS root_ns,
         min(sink_ns) AS first_ns,
         any_value(sink_event) AS sink_event,
@@ -48,10 +45,7 @@ WITH input AS (
 ),
 answered AS (
     SELECT
-        path_id,
-        root_ns,
-        sink_event,
-        is_loss_affected,
+        path_id, root_ns, sink_event, is_loss_affected,
         lag(root_ns) OVER in_time AS previous_ns,
         min(first_ns) OVER from_here AS answer_ns,
         arg_min(is_ambiguous, first_ns) OVER from_here AS is_ambiguous
@@ -65,11 +59,7 @@ answered AS (
 ),
 windowed AS (
     SELECT
-        path_id,
-        sink_event,
-        is_loss_affected,
-        is_ambiguous,
-        answer_ns,
+        path_id, sink_event, is_loss_affected, is_ambiguous, answer_ns,
         root_ns - previous_ns AS interval_ns,
         answer_ns - previous_ns AS reaction_ns,
         answer_ns - root_ns AS delay_ns
@@ -108,11 +98,7 @@ SELECT
     m.mean_ns,
     m.quantiles[2] AS p95_ns,
     m.quantiles[3] AS p99_ns,
-    m.max_ns,
-    m.event_mean_ns,
-    m.sink_event,
-    p.is_cut,
-    p.path
+    m.max_ns, m.event_mean_ns, m.sink_event, p.is_cut, p.path
 FROM main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p
 LEFT JOIN measured AS m ON p.path_id = m.path_id
 ORDER BY p.run_id, p.path, p.path_id

@@ -1,4 +1,3 @@
--- name: e2e-latency-response
 -- title: Response time by path, as CARET counts it
 -- description: The four response times of CARET. An input that does not arrive is answered by the
 --     first output of a later one. The inputs that one output answers are its cycle. 'all' is from
@@ -29,9 +28,7 @@ FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $m
 
 WITH input AS (
     SELECT
-        path_id,
-        root_kind,
-        root_id,
+        path_id, root_kind, root_id,
         any_value(root_ns) AS root_ns,
         min(sink_ns) AS first_ns,
         any_value(sink_event) AS sink_event,
@@ -44,9 +41,7 @@ WITH input AS (
 ),
 answered AS (
     SELECT
-        path_id,
-        root_ns,
-        sink_event,
+        path_id, root_ns, sink_event,
         min(first_ns) OVER from_here AS answer_ns,
         arg_min(is_ambiguous, first_ns) OVER from_here AS is_ambiguous
     FROM input
@@ -57,8 +52,7 @@ answered AS (
 ),
 cycle AS (
     SELECT
-        path_id,
-        answer_ns,
+        path_id, answer_ns,
         min(root_ns) AS oldest_ns,
         max(root_ns) AS newest_ns,
         any_value(sink_event) AS sink_event,
@@ -83,15 +77,13 @@ response AS (
         ], recursive := true)
     FROM cycle
     UNION ALL
-    SELECT
-        a.path_id, a.sink_event, a.is_ambiguous, a.root_ns, 'all', a.answer_ns - a.root_ns
+    SELECT a.path_id, a.sink_event, a.is_ambiguous, a.root_ns, 'all', a.answer_ns - a.root_ns
     FROM answered AS a
     JOIN cycle AS c ON a.path_id = c.path_id AND a.answer_ns = c.answer_ns
 ),
 measured AS (
     SELECT
-        path_id,
-        response,
+        path_id, response,
         count(response_ns) AS count,
         count(response_ns) FILTER (WHERE is_ambiguous) AS ambiguous,
         any_value(sink_event) AS sink_event,
@@ -104,19 +96,12 @@ measured AS (
     GROUP BY path_id, response
 )
 SELECT
-    p.run_id,
-    m.response,
-    m.count,
-    m.ambiguous,
-    m.min_ns,
+    p.run_id, m.response, m.count, m.ambiguous, m.min_ns,
     m.quantiles[1] AS median_ns,
     m.mean_ns,
     m.quantiles[2] AS p95_ns,
     m.quantiles[3] AS p99_ns,
-    m.max_ns,
-    m.sink_event,
-    p.is_cut,
-    p.path
+    m.max_ns, m.sink_event, p.is_cut, p.path
 FROM main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p
 JOIN measured AS m ON p.path_id = m.path_id
 ORDER BY p.run_id, p.path, p.path_id, m.response

@@ -1,4 +1,3 @@
--- name: e2e-latency
 -- title: End-to-end latency by path
 -- description: How long it took from the start of a flow (the callback of the timer that published,
 --     or the publication itself) to its end (the end of the callback at the end of the path), for
@@ -14,8 +13,7 @@
 -- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
 --     the clock
--- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that
---     stops it
+-- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that  stops it
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
 --     first or last of each root, that of the newest root, or all
 -- param: max_depth BIGINT {1..} = 32     Longest path
@@ -108,11 +106,7 @@ WITH flow AS (
     FROM path_outcome
 ),
 -- What became of a root is the same in each of its rows, but for gaps in its time.
-root AS (
-    SELECT run_id, path_id, status, reason
-    FROM flow
-    WHERE is_first IS NOT false
-),
+root AS (SELECT run_id, path_id, status, reason FROM flow WHERE is_first IS NOT false),
 affected AS (
     SELECT path_id, count(*) AS number
     FROM (SELECT DISTINCT path_id, root_kind, root_id FROM flow WHERE is_loss_affected)
@@ -120,8 +114,7 @@ affected AS (
 ),
 reason AS (
     SELECT
-        run_id,
-        path_id,
+        run_id, path_id,
         string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
     FROM (
         SELECT run_id, path_id, reason, count(*) AS number
@@ -132,18 +125,13 @@ reason AS (
     GROUP BY run_id, path_id
 ),
 completeness AS (
-    SELECT
-        run_id,
-        path_id,
-        count(*) AS roots,
-        histogram(status)::MAP(VARCHAR, BIGINT) AS number
+    SELECT run_id, path_id, count(*) AS roots, histogram(status)::MAP(VARCHAR, BIGINT) AS number
     FROM root
     GROUP BY run_id, path_id
 ),
 latency AS (
     SELECT
-        run_id,
-        path_id,
+        run_id, path_id,
         count(latency_ns) AS pairs,
         count(*) - count(latency_ns) AS stored,
         count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
@@ -182,10 +170,7 @@ SELECT
     l.longest.latency_ns AS max_ns,
     -l.longest.before_ns AS max_root_ns,
     -l.longest.before_take AS max_take_id,
-    l.sink_event,
-    p.is_cut,
-    r.reasons,
-    p.path
+    l.sink_event, p.is_cut, r.reasons, p.path
 FROM named_path AS p
 LEFT JOIN completeness AS c ON p.path_id = c.path_id
 LEFT JOIN affected AS a ON p.path_id = a.path_id

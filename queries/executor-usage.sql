@@ -1,4 +1,3 @@
--- name: executor-usage
 -- title: What executor threads spent their time on
 -- description: Time of each executor thread by what it did (executor_activity): wait for work, look
 --     for what is ready, take messages, run callbacks, or stand blocked until it gets the lock of a
@@ -112,13 +111,7 @@ callback AS (
     GROUP BY thread_id
 )
 SELECT
-    m.run_id,
-    m.hostname AS host,
-    m.nodes,
-    m.name AS process,
-    m.pid,
-    m.tid,
-    m.kind AS executor_kind,
+    m.run_id, m.hostname AS host, m.nodes, m.name AS process, m.pid, m.tid, m.kind AS executor_kind,
     greatest(m.last_ns - m.first_ns, 0) AS seen_ns,
     CASE WHEN m.has_states OR m.kind = 'events' THEN coalesce(s.wait_ns, 0) END AS wait_ns,
     CASE WHEN m.has_states THEN coalesce(s.select_ns, 0) ELSE nullif(s.select_ns, 0) END
@@ -132,8 +125,7 @@ SELECT
     coalesce(c.callbacks, 0) AS callbacks,
     coalesce(s.callback_ns, 0) / nullif(greatest(m.last_ns - m.first_ns, 0), 0)::DOUBLE
         AS callback_share,
-    m.executor_id,
-    m.thread_id
+    m.executor_id, m.thread_id
 FROM member AS m
 LEFT JOIN summed AS s ON m.thread_id = s.thread_id
 LEFT JOIN callback AS c ON m.thread_id = c.thread_id

@@ -1,4 +1,3 @@
--- name: flows
 -- title: Flows, one by one
 -- description: Every flow: when the callback or publication that begins it (its root) started, and
 --     when the end of the path was reached and how long that took, or why it was not.
@@ -41,19 +40,8 @@ SELECT run_id, path_id, subscription_id, is_path, is_cut, path, topics, publishe
 FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
 
 SELECT
-    f.run_id,
-    f.root_kind,
-    f.root_id,
-    f.root_ns,
-    f.take_id,
-    f.sink_ns,
-    f.latency_ns,
-    f.status,
-    f.reason,
-    f.is_ambiguous,
-    p.is_cut,
-    p.path,
-    m.size_bytes,
+    f.run_id, f.root_kind, f.root_id, f.root_ns, f.take_id, f.sink_ns, f.latency_ns, f.status,
+    f.reason, f.is_ambiguous, p.is_cut, p.path, m.size_bytes,
     f.sink_ns - m.stamp_ns AS age_from_stamp_ns
 FROM path_outcome AS f
 JOIN named_path AS p ON f.path_id = p.path_id

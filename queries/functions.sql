@@ -1,4 +1,3 @@
--- name: functions
 -- title: Functions that the CPU time of callbacks goes to
 -- description: Which functions ran inside each callback, as samples of perf tell
 --     (docs/functions.md, record --profile), and outside of callbacks, such as in the executor and
@@ -83,9 +82,7 @@ WITH instance AS (
     JOIN main.callback_instance AS i ON f.callback_instance_id = i.callback_instance_id
     JOIN main.callback_alike AS k ON i.callback_id = k.callback_id
 ),
-counted AS (
-    SELECT callback_id AS group_id, count(*) AS calls FROM instance GROUP BY callback_id
-),
+counted AS (SELECT callback_id AS group_id, count(*) AS calls FROM instance GROUP BY callback_id),
 -- Outside of callbacks, a group is a process: the negative of its id.
 sample AS (
     SELECT coalesce(i.callback_id, -s.process_id) AS group_id, s.stack_id, s.cpu_ns
@@ -109,17 +106,9 @@ SELECT
     f.run_id,
     coalesce(l.node, main.node_label(NULL, p.name, p.pid)) AS node,
     coalesce(l.label, 'outside of callbacks') AS callback,
-    f.function,
-    t.self_share,
-    t.total_share,
-    t.self_ns,
-    t.total_ns,
+    f.function, t.self_share, t.total_share, t.self_ns, t.total_ns,
     t.total_ns // c.calls AS per_call_ns,
-    c.calls,
-    t.self_samples,
-    t.samples,
-    f.file,
-    l.callback_id AS callback_id,
+    c.calls, t.self_samples, t.samples, f.file, l.callback_id AS callback_id,
     coalesce(l.is_internal, false) AS is_internal
 FROM found AS t
 JOIN placed AS g ON t.group_id = g.group_id

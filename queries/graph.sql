@@ -1,4 +1,3 @@
--- name: graph
 -- title: Which node sends what to which, how often and how fast
 -- description: The computation graph: nodes, and the topics, services and actions between them,
 --     with rates and latencies. The services of an action are no rows of their own. As dot,
@@ -85,8 +84,7 @@ event AS (
 ),
 edge AS (
     SELECT
-        e.run_id,
-        e.kind,
+        e.run_id, e.kind,
         main.node_label(n.full_name, p.name, p.pid) AS node,
         coalesce(e.name, '?') AS name,
         bool_and(coalesce(e.is_internal, false)) AS is_internal,
@@ -128,18 +126,10 @@ executor AS (
     GROUP BY e.executor_id, p.name, p.pid, h.hostname, e.kind
 )
 SELECT
-    e.run_id,
-    e.kind,
-    e.node,
-    e.name,
-    e.indirect,
-    e.count,
-    e.rate_hz,
+    e.run_id, e.kind, e.node, e.name, e.indirect, e.count, e.rate_hz,
     e.quantiles[1] AS median_ns,
     e.quantiles[2] AS p95_ns,
-    x.label AS executor,
-    h.executor_id,
-    e.is_internal
+    x.label AS executor, h.executor_id, e.is_internal
 FROM edge AS e
 LEFT JOIN home AS h ON e.run_id = h.run_id AND e.node = h.node
 LEFT JOIN executor AS x ON h.executor_id = x.executor_id

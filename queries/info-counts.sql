@@ -1,4 +1,3 @@
--- name: info-counts
 -- title: Rows per table
 -- description: How many rows each view has for a run, from hosts to links. Empty views are listed
 --     too.
@@ -67,10 +66,7 @@ found AS (
     WHERE list_contains($runs, run_id)
     GROUP BY run_id, object
 )
-SELECT
-    run.run_id,
-    object.object,
-    coalesce(found.row_count, 0) AS row_count
+SELECT run.run_id, object.object, coalesce(found.row_count, 0) AS row_count
 FROM main.run
 CROSS JOIN object
 LEFT JOIN found ON run.run_id = found.run_id AND object.object = found.object

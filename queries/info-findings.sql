@@ -1,4 +1,3 @@
--- name: info-findings
 -- title: Data quality
 -- description: What to know before trusting a number: lost events, unknown events, callbacks
 --     without an end, clocks that are apart. The worst comes first; the view finding has the cause
@@ -12,20 +11,10 @@
 -- column: detail VARCHAR     Numbers, and what they mean
 -- column: phase VARCHAR      What it is about: input or recording
 -- brief: severity, name, count, detail, subject
-SELECT
-    run_id,
-    severity,
-    name,
-    count,
-    subject,
-    detail,
-    phase
+SELECT run_id, severity, name, count, subject, detail, phase
 FROM main.finding
 WHERE list_contains($runs, run_id)
 ORDER BY
     run_id,
     list_position(['error', 'warning', 'info'], severity),
-    name,
-    trace_id,
-    subject,
-    detail
+    name, trace_id, subject, detail

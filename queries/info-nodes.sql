@@ -1,4 +1,3 @@
--- name: info-nodes
 -- title: ROS nodes
 -- description: The nodes of a run, and how many publishers, subscriptions, timers, services,
 --     clients, action servers and action clients each has. An action server has three of the
@@ -19,10 +18,7 @@
 -- brief: node, process_name, publisher_count, subscription_count, timer_count, service_count,
 --     client_count, action_server_count, action_client_count, pid
 SELECT
-    node.run_id,
-    node.full_name AS node,
-    process.name AS process_name,
-    process.pid,
+    node.run_id, node.full_name AS node, process.name AS process_name, process.pid,
     (
         SELECT count(*)
         FROM main.publisher
@@ -31,8 +27,7 @@ SELECT
     (
         SELECT count(*)
         FROM main.subscription
-        WHERE subscription.node_id = node.node_id
-            AND NOT subscription.is_internal
+        WHERE subscription.node_id = node.node_id AND NOT subscription.is_internal
     ) AS subscription_count,
     (SELECT count(*) FROM main.timer WHERE timer.node_id = node.node_id) AS timer_count,
     (

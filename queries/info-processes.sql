@@ -1,4 +1,3 @@
--- name: info-processes
 -- title: Processes
 -- description: The processes of a run with the number of their threads and nodes.
 -- grain: one row per process life
@@ -15,16 +14,10 @@
 -- brief: process_name, pid, hostname, node_count, thread_count, duration_ns, tracetools_version,
 --     python_version, first_seen_ns
 SELECT
-    process.run_id,
-    host.hostname,
-    process.pid,
-    process.name AS process_name,
-    process.tracetools_version,
-    process.python_version,
+    process.run_id, host.hostname, process.pid, process.name AS process_name,
+    process.tracetools_version, process.python_version,
     (SELECT count(*) FROM main.node WHERE node.process_id = process.process_id) AS node_count,
-    (
-        SELECT count(*) FROM main.thread WHERE thread.process_id = process.process_id
-    ) AS thread_count,
+    (SELECT count(*) FROM main.thread WHERE thread.process_id = process.process_id) AS thread_count,
     process.first_seen_ns,
     process.last_seen_ns - process.first_seen_ns AS duration_ns
 FROM main.process

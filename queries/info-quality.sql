@@ -1,4 +1,3 @@
--- name: info-quality
 -- title: Data quality: what is missing, and what share of the answers it affects
 -- description: What the traces lack, by trace, process and topic. `affected` of `total` things of a
 --     kind are affected: events that were discarded, time in gaps, callback instances without an
@@ -135,12 +134,7 @@ measured AS (
     JOIN main.run AS r ON b.run_id = r.run_id
 )
 SELECT
-    run_id,
-    scope,
-    subject,
-    measure,
-    affected,
-    total,
+    run_id, scope, subject, measure, affected, total,
     100 * affected / nullif(total, 0) AS affected_percent,
     is_internal
 FROM measured

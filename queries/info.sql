@@ -1,4 +1,3 @@
--- name: info
 -- title: Runs in the database
 -- description: What was ingested, when, and how much of it the tracer lost.
 -- grain: one row per run
@@ -28,16 +27,12 @@ WITH run_trace AS (
     GROUP BY run_id
 )
 SELECT
-    run.run_id,
-    run.name,
-    run.start_ns,
-    run.end_ns,
+    run.run_id, run.name, run.start_ns, run.end_ns,
     run.end_ns - run.start_ns AS duration_ns,
     coalesce(run_trace.trace_count, 0) AS trace_count,
     coalesce(run_trace.event_count, 0) AS event_count,
     coalesce(run_trace.discarded_event_count, 0) AS discarded_event_count,
-    run.msgflow_version,
-    run.labels
+    run.msgflow_version, run.labels
 FROM main.run
 LEFT JOIN run_trace ON run_trace.run_id = run.run_id
 WHERE list_contains($runs, run.run_id)

@@ -1,4 +1,3 @@
--- name: links-suggested
 -- title: Links that the data suggest
 -- description: Where messages seem to be kept: they lead nowhere, while a timer, or messages on
 --     another topic, lead to publications (periodic_async); callbacks of several subscriptions
@@ -64,8 +63,7 @@ input AS (
 ),
 -- Messages lead nowhere, while timers or other messages lead to publications.
 dead_end AS MATERIALIZED (
-    SELECT
-        *, timer_id IS NOT NULL AS is_timed, coalesce(timer_id, trigger_id) IS NULL AS is_outside
+    SELECT *, timer_id IS NOT NULL AS is_timed, coalesce(timer_id, trigger_id) IS NULL AS is_outside
     FROM main.dead_end($runs)
 ),
 queued AS (
@@ -128,8 +126,7 @@ firing_input AS (
 patient AS (
     SELECT f.publisher_id, count(*) AS patient_count
     FROM firing AS f
-    ASOF JOIN input_run AS r
-        ON f.subscription_id = r.subscription_id AND f.start_ns > r.start_ns
+    ASOF JOIN input_run AS r ON f.subscription_id = r.subscription_id AND f.start_ns > r.start_ns
     WHERE r.start_ns > f.emptied_ns
     GROUP BY f.publisher_id
 ),
@@ -150,8 +147,7 @@ met AS (
     ASOF LEFT JOIN input_run AS r
         ON f.subscription_id = r.subscription_id AND f.published_ns >= r.start_ns
     LEFT JOIN fired AS own
-        ON f.publisher_id = own.publisher_id
-        AND r.callback_instance_id = own.callback_instance_id
+        ON f.publisher_id = own.publisher_id AND r.callback_instance_id = own.callback_instance_id
     GROUP BY f.publisher_id, f.output_topic, f.node_id, f.subscription_id
 ),
 synchronous AS (
@@ -160,9 +156,7 @@ synchronous AS (
         any_value(m.firing_count) AS firing_count,
         list(DISTINCT i.topic_name ORDER BY i.topic_name) AS inputs,
         string_agg(
-            printf(
-                '%d of %d messages on %s published', m.own_count, i.run_count, i.topic_name
-            ),
+            printf('%d of %d messages on %s published', m.own_count, i.run_count, i.topic_name),
             ', ' ORDER BY i.topic_name, i.subscription_id
         ) AS evidence,
         min(m.met_count) AS met_count,
@@ -188,9 +182,7 @@ synchronous AS (
 ),
 partial AS (
     SELECT
-        node_id,
-        kind,
-        inputs,
+        node_id, kind, inputs,
         list(DISTINCT output_topic ORDER BY output_topic) AS outputs,
         printf(
             '%d of %d publications on %s came after a message of each input since the one before;'
@@ -245,9 +237,7 @@ undecided AS (
         OR count(*) < count(DISTINCT publisher_id)
         * (count(DISTINCT timer_id) + count(DISTINCT trigger_id))
 ),
-chosen_by_time AS (
-    SELECT DISTINCT publisher_id FROM synchronous WHERE kind = 'approximate_sync'
-),
+chosen_by_time AS (SELECT DISTINCT publisher_id FROM synchronous WHERE kind = 'approximate_sync'),
 kept AS (
     SELECT
         d.node_id, d.subscription_id, d.is_timed, d.topic_name, d.message_count,
@@ -367,12 +357,7 @@ candidate AS (
     SELECT node_id, kind, inputs, outputs, evidence, doubt, false FROM queued
 )
 SELECT
-    n.run_id,
-    c.kind,
-    n.full_name AS node,
-    c.inputs,
-    c.outputs,
-    c.evidence,
+    n.run_id, c.kind, n.full_name AS node, c.inputs, c.outputs, c.evidence,
     nullif(
         concat_ws(
             '; ',
@@ -386,9 +371,7 @@ SELECT
                     printf(
                         'the node also receives %s, which may be inputs as well',
                         array_to_string(
-                            list_filter(
-                                r.topics, lambda topic: NOT list_contains(c.inputs, topic)
-                            ),
+                            list_filter(r.topics, lambda topic: NOT list_contains(c.inputs, topic)),
                             ', '
                         )
                     )
@@ -396,10 +379,7 @@ SELECT
         ),
         ''
     ) AS doubt,
-    n.process,
-    n.pid,
-    n.host,
-    n.is_name_repeated
+    n.process, n.pid, n.host, n.is_name_repeated
 FROM candidate AS c
 JOIN named_node AS n ON c.node_id = n.node_id
 LEFT JOIN received AS r ON c.node_id = r.node_id

@@ -1,4 +1,3 @@
--- name: links
 -- title: Declared links
 -- description: Every declared link (annotation) and what it explains: publications, those with a
 --     message of every input, links, and how long messages waited in their caches. Entries of kind
@@ -69,19 +68,14 @@ link AS (
     GROUP BY l.annotation_id
 )
 SELECT
-    a.run_id,
-    a.kind,
-    a.source,
+    a.run_id, a.kind, a.source,
     main.node_label(n.full_name, p.name, p.pid) AS node,
-    i.topics AS inputs,
-    o.topics AS outputs,
+    i.topics AS inputs, o.topics AS outputs,
     coalesce(f.publications, 0) AS publications,
     coalesce(f.complete, 0) AS complete,
     coalesce(l.links, 0) AS links,
     coalesce(l.ambiguous, 0) AS ambiguous,
-    l.median_wait_ns,
-    l.max_wait_ns,
-    a.annotation_id
+    l.median_wait_ns, l.max_wait_ns, a.annotation_id
 FROM main.annotation AS a
 JOIN main.process AS p ON a.process_id = p.process_id
 LEFT JOIN input AS i ON a.annotation_id = i.annotation_id

@@ -1,4 +1,3 @@
--- name: objects
 -- title: ROS objects
 -- description: Every publisher, subscription, timer, service and client with its node and process,
 --     and every action server and client, which are made of these. Timers with neither node nor
@@ -84,20 +83,8 @@ symbol AS (
     GROUP BY ALL
 )
 SELECT
-    o.run_id,
-    h.hostname AS host,
-    p.name AS process,
-    p.pid,
-    n.full_name AS node,
-    o.kind,
-    o.name,
-    o.queue_depth,
-    o.goals,
-    o.created_ns,
-    s.symbols,
-    o.object_id,
-    o.is_inferred,
-    o.is_internal
+    o.run_id, h.hostname AS host, p.name AS process, p.pid, n.full_name AS node, o.kind, o.name,
+    o.queue_depth, o.goals, o.created_ns, s.symbols, o.object_id, o.is_inferred, o.is_internal
 FROM object AS o
 JOIN main.process AS p ON o.process_id = p.process_id
 JOIN main.host AS h ON p.host_id = h.host_id

@@ -1,4 +1,3 @@
--- name: path-breakdown
 -- title: What the latency of each path consists of
 -- description: End-to-end latency of every path, hop by hop, in the order of the path: --sort
 --     share:desc puts the largest part first. The parts add up to the latency: the callback up to
@@ -22,9 +21,8 @@
 --     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known),
 --     'network_or_idle', 'undecided', 'executor_busy', or exactly 'until_arrival', 'run_queue',
 --     'executor'; 'take_to_callback'
--- column: node VARCHAR [node]  Node that runs the callback, waits for it or for the
---     message, or publishes; 'between nodes' where neither worked: network_or_idle and
---     until_arrival
+-- column: node VARCHAR [node]  Node that runs the callback, waits for it or for the message, or
+--     publishes; 'between nodes' where neither worked: network_or_idle and until_arrival
 -- column: what VARCHAR             The callback, or the topic of the message
 -- column: flows BIGINT             Flows with this part
 -- column: ambiguous BIGINT         Flows of the path that pass a link that may be another one (a
@@ -34,8 +32,7 @@
 -- column: mean_ns BIGINT [ns]      Mean duration
 -- column: p95_ns BIGINT [ns]       95 % of the durations are at most this
 -- column: max_ns BIGINT [ns]       Longest duration
--- column: share DOUBLE [share]     Part of the time of all flows of the path, rounded to 4
---     places
+-- column: share DOUBLE [share]     Part of the time of all flows of the path, rounded to 4 places
 -- column: total_ns BIGINT [ns]     Sum over all flows; all parts add up to their time
 -- column: is_cut, path
 -- brief: path, hop, part, node, what, median_ns, share, max_ns, ambiguous, p95_ns, mean_ns,
@@ -102,8 +99,7 @@ WITH piece AS (
         k.alike_id AS callback_id,
         least(coalesce(p.busy_min_ns, 0), greatest(p.duration_ns, 0)) AS busy_min_ns,
         least(coalesce(p.busy_max_ns, p.duration_ns), greatest(p.duration_ns, 0)) AS busy_max_ns,
-        a.run_queue_ns,
-        a.executor_ns,
+        a.run_queue_ns, a.executor_ns,
         -- The time up to a take is three parts, all others are one.
         unnest(
             CASE
@@ -145,11 +141,7 @@ part AS (
 ),
 measured AS (
     SELECT
-        path_id,
-        hop,
-        part,
-        callback_id,
-        is_of_reader,
+        path_id, hop, part, callback_id, is_of_reader,
         min(rank) AS rank,
         -- DISTINCT would tell all flows apart, not only these: that takes most of the memory.
         count(*) FILTER (WHERE NOT is_turning)
@@ -178,26 +170,19 @@ doubted AS (
     GROUP BY path_id
 )
 SELECT
-    p.run_id,
-    m.path_id,
-    m.hop,
-    m.part,
+    p.run_id, m.path_id, m.hop, m.part,
     CASE
         WHEN m.part IN ('network_or_idle', 'until_arrival') THEN 'between nodes'
         ELSE coalesce(l.node, main.node_label(n.full_name, r.name, r.pid))
     END AS node,
     coalesce(l.label, h.topic_name) AS what,
-    m.flows,
-    d.flows AS ambiguous,
-    m.overlaps,
+    m.flows, d.flows AS ambiguous, m.overlaps,
     m.quantiles[1] AS median_ns,
     m.mean_ns,
     m.quantiles[2] AS p95_ns,
     m.max_ns,
     round(m.total_ns / nullif(sum(m.total_ns) OVER (PARTITION BY m.path_id), 0), 4) AS share,
-    m.total_ns,
-    p.is_cut,
-    p.path
+    m.total_ns, p.is_cut, p.path
 FROM measured AS m
 JOIN doubted AS d ON m.path_id = d.path_id
 JOIN message AS p ON m.path_id = p.path_id AND p.hop = 1
@@ -206,8 +191,7 @@ LEFT JOIN main.publisher AS b ON h.publisher_id = b.publisher_id
 LEFT JOIN main.subscription AS s ON h.subscription_id = s.subscription_id
 LEFT JOIN main.process AS r
     ON CASE WHEN m.is_of_reader THEN s.process_id ELSE b.process_id END = r.process_id
-LEFT JOIN main.node AS n
-    ON CASE WHEN m.is_of_reader THEN s.node_id ELSE b.node_id END = n.node_id
+LEFT JOIN main.node AS n ON CASE WHEN m.is_of_reader THEN s.node_id ELSE b.node_id END = n.node_id
 LEFT JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 ORDER BY
     p.run_id, p.path, m.path_id, m.hop, m.rank,
@@ -218,5 +202,4 @@ ORDER BY
         ],
         m.part
     ),
-    m.part,
-    m.callback_id
+    m.part, m.callback_id

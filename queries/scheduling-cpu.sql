@@ -1,4 +1,3 @@
--- name: scheduling-cpu
 -- title: CPU time by thread, of all processes
 -- description: How long each thread had a CPU in the seconds of the time window, as a kernel trace
 --     shows it (docs/scheduling.md), threads of processes without ROS included. The idle threads
@@ -29,9 +28,7 @@ WITH chosen AS (
 ),
 traced AS (
     SELECT run_id, host_id, max(length_ns) AS length_ns
-    FROM (
-        SELECT run_id, host_id, cpu, sum(running_ns) AS length_ns FROM chosen GROUP BY ALL
-    )
+    FROM (SELECT run_id, host_id, cpu, sum(running_ns) AS length_ns FROM chosen GROUP BY ALL)
     GROUP BY run_id, host_id
 ),
 second AS (
@@ -54,19 +51,12 @@ measured AS (
     GROUP BY run_id, host_id, thread_id, other_tid
 )
 SELECT
-    m.run_id,
-    h.hostname AS host,
-    l.nodes,
-    p.name AS process,
-    p.pid,
+    m.run_id, h.hostname AS host, l.nodes, p.name AS process, p.pid,
     coalesce(t.name, m.name) AS thread,
     coalesce(t.tid, m.other_tid) AS tid,
     m.running_ns,
     m.running_ns / c.length_ns AS share,
-    m.most_share,
-    m.cpus,
-    m.frequency_hz,
-    m.thread_id
+    m.most_share, m.cpus, m.frequency_hz, m.thread_id
 FROM measured AS m
 JOIN traced AS c ON m.run_id = c.run_id AND m.host_id = c.host_id
 JOIN main.host AS h ON m.host_id = h.host_id

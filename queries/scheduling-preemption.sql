@@ -1,4 +1,3 @@
--- name: scheduling-preemption
 -- title: What took the CPU from which thread
 -- description: How often each thread of a ROS process lost the CPU while it had work, to which
 --     thread, and for how long (docs/scheduling.md). Where several threads had the CPU until it got
@@ -44,21 +43,12 @@ WITH lost AS (
     GROUP BY ALL
 )
 SELECT
-    l.run_id,
-    pl.nodes,
-    p.name AS process,
-    t.name AS thread,
-    t.tid,
-    l.priority,
+    l.run_id, pl.nodes, p.name AS process, t.name AS thread, t.tid, l.priority,
     coalesce(bl.label, o.name) AS preempted_by,
     coalesce(b.tid, o.tid) AS preempted_by_tid,
     l.preempted_by_priority,
     l.preempted_by_thread_id IS NOT NULL AS is_ros,
-    l.count,
-    l.median_ns,
-    l.max_ns,
-    l.total_ns,
-    l.thread_id
+    l.count, l.median_ns, l.max_ns, l.total_ns, l.thread_id
 FROM lost AS l
 JOIN main.thread AS t ON l.thread_id = t.thread_id
 JOIN main.process AS p ON t.process_id = p.process_id

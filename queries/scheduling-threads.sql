@@ -1,4 +1,3 @@
--- name: scheduling-threads
 -- title: What threads did, as the kernel saw it
 -- description: How long each thread of a ROS process was in each state, as a kernel trace shows it
 --     (docs/scheduling.md). Without kernel traces there are no rows. Threads that ran longest come
@@ -36,8 +35,7 @@ WITH state AS (
 ),
 measured AS (
     SELECT
-        run_id,
-        thread_id,
+        run_id, thread_id,
         coalesce(sum(length_ns) FILTER (WHERE state = 'running'), 0)::BIGINT AS running_ns,
         coalesce(sum(length_ns) FILTER (WHERE state = 'preempted'), 0)::BIGINT AS preempted_ns,
         coalesce(sum(length_ns) FILTER (WHERE state = 'runnable'), 0)::BIGINT AS runnable_ns,
@@ -52,23 +50,9 @@ measured AS (
     GROUP BY run_id, thread_id
 )
 SELECT
-    m.run_id,
-    h.hostname AS host,
-    l.nodes,
-    p.name AS process,
-    p.pid,
-    t.name AS thread,
-    t.tid,
-    m.running_ns,
-    m.preempted_ns,
-    m.runnable_ns,
-    m.sleeping_ns,
-    m.uninterruptible_ns,
-    m.unknown_ns,
-    m.preemptions,
-    m.priority,
-    m.loss_affected,
-    m.thread_id
+    m.run_id, h.hostname AS host, l.nodes, p.name AS process, p.pid, t.name AS thread, t.tid,
+    m.running_ns, m.preempted_ns, m.runnable_ns, m.sleeping_ns, m.uninterruptible_ns, m.unknown_ns,
+    m.preemptions, m.priority, m.loss_affected, m.thread_id
 FROM measured AS m
 JOIN main.thread AS t ON m.thread_id = t.thread_id
 JOIN main.process AS p ON t.process_id = p.process_id

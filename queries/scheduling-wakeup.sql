@@ -1,4 +1,3 @@
--- name: scheduling-wakeup
 -- title: How long woken threads waited for a CPU
 -- description: The time from when a thread of a ROS process was woken to when it had a CPU
 --     (docs/scheduling.md). Without the kernel's wakings there are no rows. The longest wait comes
@@ -62,21 +61,12 @@ meanwhile AS (
     GROUP BY run_id, thread_id, priority
 )
 SELECT
-    w.run_id,
-    h.hostname AS host,
-    l.nodes,
-    p.name AS process,
-    t.name AS thread,
-    t.tid,
-    w.priority,
+    w.run_id, h.hostname AS host, l.nodes, p.name AS process, t.name AS thread, t.tid, w.priority,
     w.thread_id IN (SELECT thread_id FROM main.executor_thread) AS is_executor,
     w.count,
     w.quantiles[1] AS median_ns,
     w.quantiles[2] AS p99_ns,
-    w.max_ns,
-    w.total_ns,
-    n.names AS meanwhile,
-    w.thread_id
+    w.max_ns, w.total_ns, n.names AS meanwhile, w.thread_id
 FROM waited AS w
 JOIN main.thread AS t ON w.thread_id = t.thread_id
 JOIN main.process AS p ON t.process_id = p.process_id

@@ -1,4 +1,3 @@
--- name: scheduling
 -- title: CPU time of callbacks, and what kept them from the CPU
 -- description: How the time of callbacks divides into what their thread did, as a kernel trace
 --     shows it (docs/scheduling.md). The parts add up to the durations. Without kernel traces there
@@ -36,8 +35,7 @@
 -- note: kernel
 WITH measured AS (
     SELECT
-        i.run_id,
-        i.callback_id,
+        i.run_id, i.callback_id,
         count(*) AS count,
         quantile_disc(i.end_ns - i.start_ns, 0.5) AS median_ns,
         max(i.end_ns - i.start_ns) AS max_ns,
@@ -61,29 +59,12 @@ WITH measured AS (
     GROUP BY i.run_id, i.callback_id
 )
 SELECT
-    m.run_id,
-    l.node,
-    l.label AS callback,
-    m.count,
-    m.median_ns,
-    m.max_ns,
+    m.run_id, l.node, l.label AS callback, m.count, m.median_ns, m.max_ns,
     m.quantiles[1] AS running_median_ns,
     m.quantiles[2] AS running_p99_ns,
-    m.running_max_ns,
-    m.total_ns,
-    m.running_ns,
-    m.preempted_ns,
-    m.runnable_ns,
-    m.sleeping_ns,
-    m.uninterruptible_ns,
-    m.unknown_ns,
-    m.irq_ns,
-    m.softirq_ns,
-    m.preemptions,
-    m.migrations,
-    m.loss_affected,
-    m.callback_id,
-    l.is_internal
+    m.running_max_ns, m.total_ns, m.running_ns, m.preempted_ns, m.runnable_ns, m.sleeping_ns,
+    m.uninterruptible_ns, m.unknown_ns, m.irq_ns, m.softirq_ns, m.preemptions, m.migrations,
+    m.loss_affected, m.callback_id, l.is_internal
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 ORDER BY m.run_id, m.preempted_ns DESC, m.runnable_ns DESC, l.node, l.label, m.callback_id

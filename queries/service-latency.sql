@@ -1,4 +1,3 @@
--- name: service-latency
 -- title: Latency of services by service and client
 -- description: How long service calls took, in total and by part. The round trip is measured on the
 --     client's clock alone, from the sending of the request to the take of the response. The times
@@ -45,10 +44,7 @@ WITH single_service AS (
     HAVING count(*) = 1
 ),
 answer AS (
-    SELECT
-        request_id,
-        arg_min(sent_ns, response_id) AS sent_ns,
-        min(taken_ns) AS taken_ns
+    SELECT request_id, arg_min(sent_ns, response_id) AS sent_ns, min(taken_ns) AS taken_ns
     FROM main.response
     WHERE list_contains($runs, run_id) AND request_id IS NOT NULL
     GROUP BY request_id
@@ -79,9 +75,7 @@ call AS (
 ),
 measured AS (
     SELECT
-        run_id,
-        service_id,
-        client_id,
+        run_id, service_id, client_id,
         count(*) AS requests,
         count(*) FILTER (WHERE is_answered) AS answered,
         count(*) FILTER (WHERE is_not_taken) AS not_taken,
@@ -105,25 +99,14 @@ SELECT
     coalesce(s.service_name, c.service_name) AS service_name,
     main.node_label(sn.full_name, sp.name, sp.pid) AS server,
     main.node_label(cn.full_name, cp.name, cp.pid) AS client,
-    m.requests,
-    m.answered,
-    m.not_taken,
-    m.not_answered,
-    m.not_received,
-    m.negative,
-    m.request_median_ns,
-    m.wait_median_ns,
-    m.callback_median_ns,
-    m.reply_median_ns,
-    m.response_median_ns,
-    m.min_ns AS round_trip_min_ns,
+    m.requests, m.answered, m.not_taken, m.not_answered, m.not_received, m.negative,
+    m.request_median_ns, m.wait_median_ns, m.callback_median_ns, m.reply_median_ns,
+    m.response_median_ns, m.min_ns AS round_trip_min_ns,
     m.quantiles[1] AS round_trip_median_ns,
     m.mean_ns AS round_trip_mean_ns,
     m.quantiles[2] AS round_trip_p95_ns,
     m.quantiles[3] AS round_trip_p99_ns,
-    m.max_ns AS round_trip_max_ns,
-    m.service_id,
-    m.client_id,
+    m.max_ns AS round_trip_max_ns, m.service_id, m.client_id,
     coalesce(s.is_internal, c.is_internal, false) AS is_internal
 FROM measured AS m
 LEFT JOIN main.service AS s ON m.service_id = s.service_id

@@ -1,4 +1,3 @@
--- name: timers
 -- title: Whether timers keep their period, how late they are called, and why
 -- description: Jitter is how far the time from one start of the callback to the next differs from
 --     the period asked for (from the median, if the trace does not have it). Lateness is the time
@@ -59,11 +58,7 @@ WITH asked AS (
 called AS (
     SELECT
         a.alike_id AS callback_id,
-        a.created_ns,
-        i.callback_instance_id,
-        i.thread_id,
-        x.executor_id,
-        i.start_ns,
+        a.created_ns, i.callback_instance_id, i.thread_id, x.executor_id, i.start_ns,
         lag(i.start_ns) OVER (
             PARTITION BY i.callback_id ORDER BY i.start_ns, i.callback_instance_id
         ) AS previous_ns
@@ -78,11 +73,7 @@ broken AS (
 ),
 instance AS (
     SELECT
-        c.callback_id,
-        c.created_ns,
-        c.callback_instance_id,
-        c.thread_id,
-        c.start_ns,
+        c.callback_id, c.created_ns, c.callback_instance_id, c.thread_id, c.start_ns,
         c.start_ns - c.previous_ns AS interval_ns,
         coalesce(b.resumed_ns > c.previous_ns, false) AS is_loss_affected
     FROM called AS c
@@ -167,12 +158,9 @@ pair AS (
 ),
 ranked AS (
     SELECT
-        callback_id,
-        meanwhile_id,
+        callback_id, meanwhile_id,
         overlap_ns / sum(overlap_ns) OVER (PARTITION BY callback_id) AS share,
-        row_number() OVER (
-            PARTITION BY callback_id ORDER BY overlap_ns DESC, meanwhile_id
-        ) AS place
+        row_number() OVER (PARTITION BY callback_id ORDER BY overlap_ns DESC, meanwhile_id) AS place
     FROM pair
 ),
 meanwhile AS (
@@ -190,16 +178,10 @@ meanwhile AS (
     GROUP BY r.callback_id
 )
 SELECT
-    a.run_id,
-    n.node,
-    n.label AS callback,
-    a.objects,
-    a.period_ns,
-    u.median_ns AS period_median_ns,
+    a.run_id, n.node, n.label AS callback, a.objects, a.period_ns, u.median_ns AS period_median_ns,
     c.rate_hz,
     coalesce(c.count, 0) AS count,
-    d.missed,
-    k.bunched,
+    d.missed, k.bunched,
     k.jitter[1] AS jitter_median_ns,
     k.jitter[2] AS jitter_p95_ns,
     k.jitter[3] AS jitter_p99_ns,
@@ -220,15 +202,10 @@ SELECT
             AND g.place[2] - g.place[1] <= a.period_ns // 10
             THEN 'reset'
     END AS off_grid,
-    d.busy_share,
-    d.run_queue_share,
-    m.shares AS meanwhile,
+    d.busy_share, d.run_queue_share, m.shares AS meanwhile,
     coalesce(c.count - c.loss_affected - coalesce(d.known, 0), 0) AS unknown,
     coalesce(c.loss_affected, 0) AS loss_affected,
-    a.symbol,
-    a.timer_id,
-    a.callback_id,
-    n.is_internal
+    a.symbol, a.timer_id, a.callback_id, n.is_internal
 FROM asked AS a
 JOIN main.callback_label AS n ON a.callback_id = n.callback_id
 LEFT JOIN counted AS c ON a.callback_id = c.callback_id

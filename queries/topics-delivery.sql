@@ -1,4 +1,3 @@
--- name: topics-delivery
 -- title: Messages delivered, dropped and lost by topic and subscription
 -- description: What became of the messages published in the time window at each subscription of
 --     their topic. Dropped: the queue was full. Lost: they did not arrive or could not be taken,
@@ -33,9 +32,7 @@ WITH outcome AS (
     SELECT d.subscription_id, d.status, d.reason, count(*) AS number
     FROM main.stat_delivery AS d
     JOIN main.publication AS b ON d.publication_id = b.publication_id
-    WHERE list_contains($runs, d.run_id)
-        AND b.start_ns >= $start_ns
-        AND b.start_ns < $end_ns
+    WHERE list_contains($runs, d.run_id) AND b.start_ns >= $start_ns AND b.start_ns < $end_ns
     GROUP BY d.subscription_id, d.status, d.reason
 ),
 delivery AS (
@@ -57,9 +54,7 @@ orphan_outcome AS (
     SELECT o.subscription_id, o.reason, count(*) AS number
     FROM main.stat_orphan AS o
     JOIN main.take AS t ON o.take_id = t.take_id
-    WHERE list_contains($runs, o.run_id)
-        AND t.taken_ns >= $start_ns
-        AND t.taken_ns < $end_ns
+    WHERE list_contains($runs, o.run_id) AND t.taken_ns >= $start_ns AND t.taken_ns < $end_ns
     GROUP BY o.subscription_id, o.reason
 ),
 orphan AS (
@@ -71,8 +66,7 @@ orphan AS (
     GROUP BY subscription_id
 )
 SELECT
-    s.run_id,
-    s.topic_name,
+    s.run_id, s.topic_name,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
     coalesce(d.published, 0) AS published,
     coalesce(d.delivered, 0) AS delivered,
@@ -84,10 +78,7 @@ SELECT
     100 * d.delivered / nullif(d.delivered + d.dropped + d.lost, 0) AS delivered_percent,
     100 * d.lost / nullif(d.delivered + d.dropped + d.lost, 0) AS lost_percent,
     coalesce(o.orphans, 0) AS orphans,
-    d.reasons,
-    o.orphan_reasons,
-    s.subscription_id,
-    s.is_internal
+    d.reasons, o.orphan_reasons, s.subscription_id, s.is_internal
 FROM main.subscription AS s
 JOIN main.process AS p ON s.process_id = p.process_id
 LEFT JOIN main.node AS n ON s.node_id = n.node_id

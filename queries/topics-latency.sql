@@ -1,4 +1,3 @@
--- name: topics-latency
 -- title: Latency from publication to take by topic and subscription
 -- description: How long messages took from the end of their publication to their take. That
 --     includes the time for which the receiving executor was busy with other callbacks, given as
@@ -43,8 +42,7 @@ WITH received AS (
 ),
 measured AS (
     SELECT
-        run_id,
-        subscription_id,
+        run_id, subscription_id,
         count(*) AS takes,
         count(publication_id) AS linked,
         count(stored_ns) AS stored,
@@ -61,23 +59,14 @@ measured AS (
     GROUP BY run_id, subscription_id
 )
 SELECT
-    m.run_id,
-    s.topic_name,
+    m.run_id, s.topic_name,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
-    m.takes,
-    m.linked,
-    m.stored,
-    m.ambiguous,
-    m.negative,
-    m.min_ns,
+    m.takes, m.linked, m.stored, m.ambiguous, m.negative, m.min_ns,
     m.quantiles[1] AS median_ns,
-    m.mean_ns,
-    m.busy_mean_min_ns,
-    m.busy_mean_max_ns,
+    m.mean_ns, m.busy_mean_min_ns, m.busy_mean_max_ns,
     m.quantiles[2] AS p95_ns,
     m.quantiles[3] AS p99_ns,
-    m.max_ns,
-    m.subscription_id,
+    m.max_ns, m.subscription_id,
     coalesce(s.is_internal, false) AS is_internal
 FROM measured AS m
 LEFT JOIN main.subscription AS s ON m.subscription_id = s.subscription_id

@@ -1,4 +1,3 @@
--- name: topics-rate
 -- title: Publication rates and periods
 -- description: How many messages each publisher published, at what rate, and how regularly. The
 --     rate is taken from the first to the last publication in the time window.
@@ -19,9 +18,7 @@
 --     count, period_p95_ns, period_min_ns
 WITH published AS (
     SELECT
-        run_id,
-        publisher_id,
-        start_ns,
+        run_id, publisher_id, start_ns,
         start_ns - lag(start_ns) OVER (
             PARTITION BY publisher_id ORDER BY start_ns, publication_id
         ) AS period_ns
@@ -33,8 +30,7 @@ WITH published AS (
 ),
 measured AS (
     SELECT
-        run_id,
-        publisher_id,
+        run_id, publisher_id,
         count(*) AS count,
         (count(*) - 1) * 1e9 / nullif(max(start_ns) - min(start_ns), 0) AS rate_hz,
         min(period_ns) AS period_min_ns,
@@ -45,18 +41,12 @@ measured AS (
     GROUP BY run_id, publisher_id
 )
 SELECT
-    m.run_id,
-    b.topic_name,
+    m.run_id, b.topic_name,
     main.node_label(n.full_name, p.name, p.pid) AS publisher,
-    m.count,
-    m.rate_hz,
-    m.period_min_ns,
+    m.count, m.rate_hz, m.period_min_ns,
     m.quantiles[1] AS period_median_ns,
     m.quantiles[2] AS period_p95_ns,
-    m.period_max_ns,
-    m.period_deviation_ns,
-    m.publisher_id,
-    b.is_internal
+    m.period_max_ns, m.period_deviation_ns, m.publisher_id, b.is_internal
 FROM measured AS m
 JOIN main.publisher AS b ON m.publisher_id = b.publisher_id
 JOIN main.process AS p ON b.process_id = p.process_id

@@ -1,4 +1,3 @@
--- name: topics-summary
 -- title: Topics at a glance: rate, jitter, drops and latency
 -- description: Of each topic, how often and how regularly it was published, what became of its
 --     messages, and how long they took to be taken, in the time window. The variants rate, delivery
@@ -31,8 +30,7 @@
 -- note: clocks
 WITH topic AS (
     SELECT
-        run_id,
-        topic_name,
+        run_id, topic_name,
         sum(publisher)::BIGINT AS publisher_count,
         sum(subscription)::BIGINT AS subscription_count,
         bool_or(is_internal) AS is_internal
@@ -40,18 +38,14 @@ WITH topic AS (
         SELECT run_id, topic_name, is_internal, 1 AS publisher, 0 AS subscription
         FROM main.publisher
         UNION ALL
-        SELECT run_id, topic_name, is_internal, 0, 1
-        FROM main.subscription
+        SELECT run_id, topic_name, is_internal, 0, 1 FROM main.subscription
     )
     WHERE list_contains($runs, run_id)
     GROUP BY run_id, topic_name
 ),
 published AS (
     SELECT
-        b.run_id,
-        p.topic_name,
-        b.publisher_id,
-        b.start_ns,
+        b.run_id, p.topic_name, b.publisher_id, b.start_ns,
         b.start_ns - lag(b.start_ns) OVER (
             PARTITION BY b.publisher_id ORDER BY b.start_ns, b.publication_id
         ) AS period_ns
@@ -61,8 +55,7 @@ published AS (
 ),
 rate AS (
     SELECT
-        run_id,
-        topic_name,
+        run_id, topic_name,
         count(*) AS number,
         (count(*) - 1) * 1e9 / nullif(max(start_ns) - min(start_ns), 0) AS rate_hz,
         quantile_disc(period_ns, 0.5) AS period_median_ns
@@ -89,8 +82,7 @@ outcome AS (
 ),
 delivery AS (
     SELECT
-        run_id,
-        topic_name,
+        run_id, topic_name,
         sum(CASE WHEN status = 'delivered' THEN number ELSE 0 END)::BIGINT AS delivered,
         sum(CASE WHEN status = 'dropped' THEN number ELSE 0 END)::BIGINT AS dropped,
         sum(CASE WHEN status = 'lost' THEN number ELSE 0 END)::BIGINT AS lost,
@@ -104,8 +96,7 @@ delivery AS (
 ),
 latency AS (
     SELECT
-        t.run_id,
-        s.topic_name,
+        t.run_id, s.topic_name,
         quantile_disc(l.latency_ns, [0.5, 0.95]) AS quantiles,
         max(l.latency_ns) AS max_ns
     FROM main.take AS t
@@ -118,14 +109,9 @@ latency AS (
     GROUP BY t.run_id, s.topic_name
 )
 SELECT
-    t.run_id,
-    t.topic_name,
-    t.publisher_count,
-    t.subscription_count,
+    t.run_id, t.topic_name, t.publisher_count, t.subscription_count,
     coalesce(r.number, 0) AS publication_count,
-    r.rate_hz,
-    r.period_median_ns,
-    j.period_deviation_ns,
+    r.rate_hz, r.period_median_ns, j.period_deviation_ns,
     coalesce(d.delivered, 0) AS delivered,
     coalesce(d.dropped, 0) AS dropped,
     coalesce(d.lost, 0) AS lost,
@@ -135,8 +121,7 @@ SELECT
     d.reasons,
     l.quantiles[1] AS latency_median_ns,
     l.quantiles[2] AS latency_p95_ns,
-    l.max_ns AS latency_max_ns,
-    t.is_internal
+    l.max_ns AS latency_max_ns, t.is_internal
 FROM topic AS t
 LEFT JOIN rate AS r ON t.run_id = r.run_id AND t.topic_name IS NOT DISTINCT FROM r.topic_name
 LEFT JOIN jitter AS j ON t.run_id = j.run_id AND t.topic_name IS NOT DISTINCT FROM j.topic_name

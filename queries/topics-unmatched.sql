@@ -1,4 +1,3 @@
--- name: topics-unmatched
 -- title: Takes without a publication, and messages that were not taken, each with its reason
 -- description: Every take whose publication is not known, and every message that a subscription of
 --     its topic did not take, in order of time. The query topics --measure delivery counts them.
@@ -37,24 +36,16 @@ WITH missing AS (
     UNION ALL
     SELECT
         o.run_id, t.taken_ns, 'take', NULL, 'orphan', o.reason,
-        t.source_timestamp_ns, NULL, o.take_id, o.subscription_id,
-        t.process_id
+        t.source_timestamp_ns, NULL, o.take_id, o.subscription_id, t.process_id
     FROM main.stat_orphan AS o
     JOIN main.take AS t ON o.take_id = t.take_id
 )
 SELECT
-    m.run_id,
-    m.at_ns,
-    m.side,
+    m.run_id, m.at_ns, m.side,
     coalesce(s.topic_name, b.topic_name) AS topic_name,
     main.node_label(bn.full_name, bp.name, bp.pid) AS publisher,
     main.node_label(sn.full_name, sp.name, sp.pid) AS subscriber,
-    m.status,
-    m.reason,
-    m.source_timestamp_ns,
-    m.publication_id,
-    m.take_id,
-    m.subscription_id,
+    m.status, m.reason, m.source_timestamp_ns, m.publication_id, m.take_id, m.subscription_id,
     coalesce(s.is_internal, b.is_internal, false) AS is_internal
 FROM missing AS m
 LEFT JOIN main.subscription AS s ON m.subscription_id = s.subscription_id

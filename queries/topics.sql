@@ -1,4 +1,3 @@
--- name: topics
 -- title: Topics
 -- description: The topics of a run: who publishes and subscribes, how many messages were published
 --     and how many were handed over. Publishers and subscriptions without a known topic are a
@@ -32,10 +31,7 @@ subscription_message AS (
 
 endpoint AS (
     SELECT
-        publisher.run_id,
-        publisher.topic_name,
-        publisher.is_internal,
-        1 AS publisher_count,
+        publisher.run_id, publisher.topic_name, publisher.is_internal, 1 AS publisher_count,
         0 AS subscription_count,
         coalesce(publisher_message.publication_count, 0) AS publication_count,
         0 AS take_count
@@ -43,20 +39,15 @@ endpoint AS (
     LEFT JOIN publisher_message ON publisher_message.publisher_id = publisher.publisher_id
     UNION ALL
     SELECT
-        subscription.run_id,
-        subscription.topic_name,
-        subscription.is_internal,
-        0 AS publisher_count,
-        1 AS subscription_count,
-        0 AS publication_count,
+        subscription.run_id, subscription.topic_name, subscription.is_internal,
+        0 AS publisher_count, 1 AS subscription_count, 0 AS publication_count,
         coalesce(subscription_message.take_count, 0) AS take_count
     FROM main.subscription
     LEFT JOIN subscription_message
         ON subscription_message.subscription_id = subscription.subscription_id
 )
 SELECT
-    run_id,
-    topic_name,
+    run_id, topic_name,
     CAST(sum(publisher_count) AS BIGINT) AS publisher_count,
     CAST(sum(subscription_count) AS BIGINT) AS subscription_count,
     CAST(sum(publication_count) AS BIGINT) AS publication_count,

@@ -1,4 +1,3 @@
--- name: waits-instance
 -- title: Waits of callbacks, one by one
 -- description: For every callback instance: the time since the end of the publication of its
 --     message (or since the timer was due, or the request was sent), for how much of it the
@@ -6,8 +5,7 @@
 --     are left out. Where the kernel was traced, it shows when the message arrived, and for how
 --     long the thread waited for a CPU.
 -- grain: one row per callback instance that is not nested in another
--- param: callback_id BIGINT = NULL  Only instances of this callback_id (query waits lists
---     them)
+-- param: callback_id BIGINT = NULL  Only instances of this callback_id (query waits lists  them)
 -- param: min_busy_ns BIGINT {0..} = 0  Only waits in which the executor may have been busy for that
 --     long [ns]
 -- column: run_id BIGINT             Run
@@ -62,8 +60,7 @@ WITH waited AS MATERIALIZED (
 ),
 pair AS (
     SELECT
-        callback_instance_id,
-        callback_id,
+        callback_instance_id, callback_id,
         unnest(meanwhile_callback_ids) AS meanwhile_callback_id,
         unnest(meanwhile_ns) AS overlap_ns
     FROM waited
@@ -82,10 +79,7 @@ meanwhile AS (
     GROUP BY p.callback_instance_id
 ),
 taken AS (
-    SELECT
-        callback_instance_id,
-        unnest(cpu_taken_by) AS name,
-        unnest(cpu_taken_ns) AS length_ns
+    SELECT callback_instance_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns
     FROM waited
 ),
 taker AS (
@@ -98,15 +92,8 @@ taker AS (
     GROUP BY callback_instance_id
 )
 SELECT
-    w.run_id,
-    w.start_ns,
-    l.node,
-    l.label AS callback,
-    w.since,
-    w.wait_ns,
-    w.busy_min_ns,
-    w.busy_max_ns,
-    w.held_max_ns,
+    w.run_id, w.start_ns, l.node, l.label AS callback, w.since, w.wait_ns, w.busy_min_ns,
+    w.busy_max_ns, w.held_max_ns,
     CASE
         WHEN w.wait_ns IS NULL OR w.busy_max_ns IS NULL THEN NULL
         WHEN 2 * (w.run_queue_ns + w.preempted_ns) > w.wait_ns THEN 'run queue'
@@ -118,14 +105,8 @@ SELECT
     END AS reason,
     w.wait_ns - w.busy_max_ns - coalesce(w.held_max_ns, 0) AS rest_min_ns,
     w.wait_ns - w.busy_min_ns AS rest_max_ns,
-    m.names AS meanwhile,
-    w.until_arrival_ns,
-    w.run_queue_ns,
-    w.preempted_ns,
-    k.names AS cpu_taken_by,
-    w.is_loss_affected,
-    w.callback_instance_id,
-    w.callback_id,
+    m.names AS meanwhile, w.until_arrival_ns, w.run_queue_ns, w.preempted_ns,
+    k.names AS cpu_taken_by, w.is_loss_affected, w.callback_instance_id, w.callback_id,
     l.is_internal
 FROM waited AS w
 JOIN main.callback_label AS l ON w.callback_id = l.callback_id

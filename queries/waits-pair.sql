@@ -1,4 +1,3 @@
--- name: waits-pair
 -- title: Which callbacks keep which others waiting
 -- description: For every pair of callbacks of one executor: how long one ran while the other
 --     waited. The literature calls this interference, or blocking if the one that ran should not
@@ -41,8 +40,7 @@ FROM main.executor_wait_explained($runs, arrivals := 'exact_arrival');
 
 WITH pair AS (
     SELECT
-        run_id,
-        callback_id,
+        run_id, callback_id,
         unnest(meanwhile_callback_ids) AS meanwhile_callback_id,
         unnest(meanwhile_instances) AS instances,
         unnest(meanwhile_certain_ns) AS overlap_min_ns,
@@ -58,9 +56,7 @@ taken AS (
 ),
 measured AS (
     SELECT
-        run_id,
-        callback_id,
-        meanwhile_callback_id,
+        run_id, callback_id, meanwhile_callback_id,
         NULL::VARCHAR AS meanwhile_thread,
         count(*) AS waits,
         sum(instances)::BIGINT AS instances,
@@ -78,22 +74,11 @@ measured AS (
     GROUP BY run_id, callback_id, name
 )
 SELECT
-    m.run_id,
-    l.node,
-    l.label AS callback,
-    o.node AS meanwhile_node,
-    o.label AS meanwhile_callback,
-    m.meanwhile_thread,
-    m.waits,
-    m.instances,
-    m.overlap_min_ns,
-    m.overlap_max_ns,
-    m.worst_ns,
+    m.run_id, l.node, l.label AS callback, o.node AS meanwhile_node, o.label AS meanwhile_callback,
+    m.meanwhile_thread, m.waits, m.instances, m.overlap_min_ns, m.overlap_max_ns, m.worst_ns,
     m.thread_max_ns,
     m.overlap_max_ns / sum(m.overlap_max_ns) OVER (PARTITION BY m.callback_id) AS share,
-    m.callback_id,
-    m.meanwhile_callback_id,
-    l.is_internal
+    m.callback_id, m.meanwhile_callback_id, l.is_internal
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 LEFT JOIN main.callback_label AS o ON m.meanwhile_callback_id = o.callback_id

@@ -1,4 +1,3 @@
--- name: waits
 -- title: How long callbacks waited, and what their executor ran meanwhile
 -- description: The time from the end of a publication (or from when a timer was due, or a request
 --     was sent) to the start of its callback, and how much of it the executor was busy with other
@@ -52,17 +51,15 @@
 WITH waited AS MATERIALIZED (
     SELECT
         w.run_id, w.callback_instance_id, k.alike_id AS callback_id, w.wait_ns, w.busy_min_ns,
-        w.busy_max_ns, w.held_max_ns, w.is_loss_affected, w.meanwhile_callback_ids,
-        w.meanwhile_ns, w.until_arrival_ns, w.run_queue_ns, w.preempted_ns, w.cpu_taken_by,
-        w.cpu_taken_ns
+        w.busy_max_ns, w.held_max_ns, w.is_loss_affected, w.meanwhile_callback_ids, w.meanwhile_ns,
+        w.until_arrival_ns, w.run_queue_ns, w.preempted_ns, w.cpu_taken_by, w.cpu_taken_ns
     FROM main.executor_wait_explained($runs) AS w
     JOIN main.callback_alike AS k ON w.callback_id = k.callback_id
     WHERE w.start_ns >= $start_ns AND w.start_ns < $end_ns
 ),
 measured AS (
     SELECT
-        run_id,
-        callback_id,
+        run_id, callback_id,
         count(*) AS count,
         count(*) FILTER (WHERE busy_min_ns > 0) AS delayed_min,
         count(*) FILTER (WHERE coalesce(busy_max_ns, busy_min_ns) > 0) AS delayed_max,
@@ -101,8 +98,7 @@ pair AS (
 ),
 ranked AS (
     SELECT
-        p.callback_id,
-        p.meanwhile_id,
+        p.callback_id, p.meanwhile_id,
         p.overlap_ns / sum(p.overlap_ns) OVER (PARTITION BY p.callback_id) AS share,
         row_number() OVER (
             PARTITION BY p.callback_id ORDER BY p.overlap_ns DESC, p.meanwhile_id
@@ -124,16 +120,13 @@ meanwhile AS (
     GROUP BY r.callback_id
 ),
 taken AS (
-    SELECT callback_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns
-    FROM waited
+    SELECT callback_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns FROM waited
 ),
 taker AS (
     SELECT
         callback_id, name,
         sum(length_ns) / sum(sum(length_ns)) OVER (PARTITION BY callback_id) AS share,
-        row_number() OVER (
-            PARTITION BY callback_id ORDER BY sum(length_ns) DESC, name
-        ) AS place
+        row_number() OVER (PARTITION BY callback_id ORDER BY sum(length_ns) DESC, name) AS place
     FROM taken
     GROUP BY callback_id, name
 ),
@@ -146,31 +139,11 @@ preemptor AS (
     GROUP BY callback_id
 )
 SELECT
-    m.run_id,
-    l.node,
-    l.label AS callback,
-    m.count,
-    m.delayed_min,
-    m.delayed_max,
-    m.wait_median_ns,
-    m.wait_max_ns,
-    m.busy_worst_ns,
-    m.busy_total_min_ns,
-    m.busy_total_max_ns,
-    m.held_total_max_ns,
-    m.rest_total_min_ns,
-    m.rest_total_max_ns,
-    w.shares AS meanwhile,
-    m.arrived,
-    m.until_arrival_total_ns,
-    m.run_queue_worst_ns,
-    m.run_queue_total_ns,
-    m.preempted_worst_ns,
-    m.preempted_total_ns,
-    p.shares AS cpu_taken_by,
-    m.unknown,
-    m.loss_affected,
-    m.callback_id,
+    m.run_id, l.node, l.label AS callback, m.count, m.delayed_min, m.delayed_max, m.wait_median_ns,
+    m.wait_max_ns, m.busy_worst_ns, m.busy_total_min_ns, m.busy_total_max_ns, m.held_total_max_ns,
+    m.rest_total_min_ns, m.rest_total_max_ns, w.shares AS meanwhile, m.arrived,
+    m.until_arrival_total_ns, m.run_queue_worst_ns, m.run_queue_total_ns, m.preempted_worst_ns,
+    m.preempted_total_ns, p.shares AS cpu_taken_by, m.unknown, m.loss_affected, m.callback_id,
     l.is_internal
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id

@@ -1,5 +1,7 @@
 """Relations between tables, and the rows that break them: they refer to a row that is missing.
 
+A row of another run is none: nothing is linked across runs.
+
 `store.sql` marks the columns that refer to another table. The databases have no foreign keys.
 """
 
@@ -13,10 +15,14 @@ if TYPE_CHECKING:
     import duckdb
 
 
+# A run, and the first and last of its ids.
+_Block = tuple[int, int, int]
+
+
 def broken_relations(
     con: duckdb.DuckDBPyConnection, run_id: int | None = None
 ) -> list[dict[str, Any]]:
-    """Return the columns with identities that are no row of the table that they refer to.
+    """Return the columns with identities that no row of their run has where they refer to.
 
     Returns:
         For each run and column: `run_id`, `child` ('table.column'), `parent` (a table) and `count`.
@@ -44,26 +50,38 @@ def broken_relations(
     ]
 
 
-def _blocks(con: duckdb.DuckDBPyConnection, names: set[str]) -> dict[str, tuple[int, int] | None]:
-    """Return the first and last of the ids that each table holds, None if some are missing."""
+def _blocks(con: duckdb.DuckDBPyConnection, names: set[str]) -> dict[str, list[_Block] | None]:
+    """Return the ids that each table holds, None where a run's are not one block."""
     rows = con.execute(
         " UNION ALL ".join(
-            f"SELECT '{name}', min({name}_id), max({name}_id), count({name}_id) FROM store.{name}"
+            f"SELECT '{name}', run_id, min({name}_id), max({name}_id), count({name}_id)"
+            f" FROM store.{name} GROUP BY run_id"
             for name in names
         )
     ).fetchall()
-    return {
-        name: (first or 1, last or 0) if count == (last or 0) - (first or 1) + 1 else None
-        for name, first, last, count in rows
-    }
+    blocks: dict[str, list[_Block] | None] = {name: [] for name in names}
+    for name, run_id, first, last, count in rows:
+        known = blocks[name]
+        whole = known is not None and count == last - first + 1
+        blocks[name] = [*known, (run_id, first, last)] if known is not None and whole else None
+    return blocks
 
 
-def _broken(column: str, parent: str, block: tuple[int, int] | None) -> str:
-    """Return the expression that counts the children without a parent.
+def _broken(column: str, parent: str, blocks: list[_Block] | None) -> str:
+    """Return the expression that counts the children without a parent in their run.
 
     Ingests write whole blocks of ids, for which a comparison is enough. An id that is used twice
     passes it, but not `identity_is_unique`.
     """
-    if block is not None:
-        return f"count(*) FILTER (child.{column} < {block[0]} OR child.{column} > {block[1]})"
-    return f"count(*) FILTER (child.{column} NOT IN (SELECT {parent}_id FROM store.{parent}))"
+    if blocks is None:
+        rows = f"SELECT (run_id, {parent}_id) FROM store.{parent}"
+        broken = f"(child.run_id, child.{column}) NOT IN ({rows})"
+    elif blocks:
+        first, last = (
+            "MAP {" + ", ".join(f"{block[0]}: {block[end]}" for block in blocks) + "}[child.run_id]"
+            for end in (1, 2)
+        )
+        broken = f"coalesce(child.{column} NOT BETWEEN {first} AND {last}, true)"
+    else:
+        broken = "true"
+    return f"count(*) FILTER (child.{column} IS NOT NULL AND {broken})"

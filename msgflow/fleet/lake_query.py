@@ -214,7 +214,7 @@ def _command(lake: Lake, row: Mapping[str, Any]) -> str | None:
 
 
 def _tables(header: Header) -> list[str]:
-    read = relations_of(statements().text(header.name.partition(".")[2]))
+    read = relations_of(statements().text(header.name))
     return sorted(read & ANSWERS.keys())
 
 
@@ -281,7 +281,7 @@ def _group(
 
 
 def _text(header: Header) -> str:
-    return statements().text(header.name.partition(".")[2]).rstrip().rstrip(";")
+    return statements().text(header.name).rstrip().rstrip(";")
 
 
 def _asked(lake: Lake, name: str, con: duckdb.DuckDBPyConnection, ask: Any) -> Any:

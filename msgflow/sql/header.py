@@ -1,6 +1,5 @@
-"""The header at the top of every SQL file: what the object is called, takes, and returns.
+"""The header at the top of every SQL file: what the object means, takes, and returns.
 
-    -- name: e2e-latency
     -- title: End-to-end latency by path
     -- description: Time from the start of a flow's root to the end of its sink,
     --     one line continued by four spaces.
@@ -22,7 +21,10 @@
     -- column: run_id, path_id, root_ns
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
+The name of the object is that of its file; below `schema/` the schema that the objects of its
+folder are in stands before. Only what others put in front of theirs says its kind: `inline`.
 
+- `column`: of what people see: public views, queries, pages, results. Others name columns in SQL.
 - `note: clocks`: rows compare times of hosts, so the runner names clocks that differ.
 - `note: callbacks`: rows are made of callbacks, so the runner names processes that record none.
 - `note: kernel`: rows are made of the kernel's events, so the runner says where there are none.
@@ -44,8 +46,8 @@ The header ends at the first line that is not a `--` comment. Two spaces end a p
 - `unites`: objects whose rows a macro reads as one table. Its first argument is the name of that
   table, its second the run. An object whose `when` finds no row is left out.
 
-- `like`: other files of the folder, or of `schema/public` (main.NAME). A `param` or a `column` may
-  be a list of names: the first of these files that has it declares it.
+- `like`: other files of the folder, of `schema/public` (main.NAME) or `queries` (queries.NAME). A
+  `param` or a `column` may be a list of names: the first of these files that has it declares it.
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
   A query may have several: each value of them is one file.
@@ -102,10 +104,25 @@ _NEXT_SOURCE = re.compile(r", (?=[a-z]+\.)")
 _RANGE = re.compile(r"(-?\d+)\.\.(-?\d+)?")
 _REPEATABLE = ("param", "column", "variant")
 _SINGLE = (
-    "name", "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when",
+    "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when",
     "also", "unites", "brief", "answer", "heading", "slowest", "zero", "like",
 )  # fmt: skip
-_KINDS = ("view", "inline", "macro")
+_MACRO = re.compile(r"(?:--[^\n]*\n|\s)*CREATE (?:OR REPLACE )?MACRO ")
+# The schema of the database that the objects of a folder of `schema/` are in.
+SCHEMAS = {
+    "alignment": "staging",
+    "model": "staging",
+    "kernel": "staging",
+    "overlap": "overlap",
+    "link": "derive",
+    "clock": "derive",
+    "delivery": "derive",
+    "flow": "derive",
+    "stat": "derive",
+    "public": "main",
+    "health": "finding",
+    "internal": "internal",
+}
 _NOTES = ("clocks", "callbacks", "kernel", "requests", "goals", "samples")
 
 
@@ -152,7 +169,7 @@ class Step:
 class Header:
     """The header of an SQL file, and the SQL below it; the grammar above explains the rest."""
 
-    name: str  # object name, equal to the file name
+    name: str  # the file's name, below `schema/` behind the schema that it is in
     title: str  # a few words for lists; the name where the file has none
     description: str  # what it means
     grain: str  # "one row per …"; empty for scalar macros
@@ -243,14 +260,13 @@ def parse(text: str, path: Path) -> Header:
         if field.key in single:
             raise _error(path, field.line, f"{field.key!r} stands twice")
         single[field.key] = field.value
-    for required in ("name", "description"):
-        if required not in single:
-            raise _error(path, 1, f"the header has no {required!r}")
+    if "description" not in single:
+        raise _error(path, 1, "the header has no 'description'")
     if not body.strip():
         raise _error(path, len(text.splitlines()) or 1, "there is no SQL below the header")
-    kind = single.get("kind", "view")
-    if kind not in _KINDS:
-        raise _error(path, 1, f"kind {kind!r} is not one of {', '.join(_KINDS)}")
+    kind = single.get("kind", "macro" if _MACRO.match(body) else "view")
+    if "kind" in single and kind != "inline":
+        raise _error(path, 1, f"a file says only that its kind is 'inline', not {kind!r}")
     note = single.get("note")
     if note is not None and note not in _NOTES:
         raise _error(path, 1, f"note {note!r} is not one of {', '.join(_NOTES)}")
@@ -264,9 +280,10 @@ def parse(text: str, path: Path) -> Header:
         for name in _names(single.get(key, "")):
             if name not in [column.name for column in columns]:
                 raise _error(path, 1, f"{key} names a column that there is not: {name!r}")
+    name = name_of(path)
     return Header(
-        name=single["name"],
-        title=single.get("title", single["name"]),
+        name=name,
+        title=single.get("title", name),
         description=single["description"],
         grain=single.get("grain", ""),
         kind=kind,
@@ -294,6 +311,13 @@ def parse(text: str, path: Path) -> Header:
 def read(path: Path) -> Header:
     """Parse the SQL file at `path`."""
     return parse(path.read_text(encoding="utf-8"), path)
+
+
+def name_of(path: Path) -> str:
+    """Return the name that the object of a file has by its place."""
+    below = str(path.parent.as_posix()).rpartition("schema/")[2]
+    schema = SCHEMAS.get(below.partition("/")[0])
+    return path.stem if schema is None else f"{schema}.{path.stem}"
 
 
 def relations_of(text: str) -> frozenset[str]:
@@ -353,9 +377,10 @@ def _sources(text: str) -> tuple[tuple[str, str], ...]:
 
 
 def _like(name: str, path: Path) -> Header:
-    schema, _, stem = name.rpartition(".")
-    folder = resource_directory("schema") / "public" if schema == "main" else path.parent
-    return _declaring(folder / f"{stem}.sql")
+    room, _, stem = name.rpartition(".")
+    if room == "main":
+        return _declaring(resource_directory("schema") / "public" / f"{stem}.sql")
+    return _declaring((resource_directory(room) if room else path.parent) / f"{stem}.sql")
 
 
 @cache

@@ -1,4 +1,3 @@
--- name: staging.placement
 -- description: The clock and host that kernel traces are of. Where one names no clock that a ROS
 --     process has, its schedule tells the clock, and the name of a host there counts; a trace of
 --     perf that no schedule proves is of the only clock there is. `shift_ns` has to be added to its

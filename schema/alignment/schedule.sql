@@ -1,4 +1,3 @@
--- name: staging.schedule
 -- description: The clock of each kernel trace: the one by which most events of ROS processes
 --     happened while the kernel says that their thread ran on their CPU. A thread has one number
 --     until its process initialises ROS again, and no other thread has that meanwhile: any other
@@ -27,8 +26,7 @@ lived AS (
             contradiction_id IS NULL AS is_known
         FROM staging.schedule_moment
     ) AS m
-    ASOF LEFT JOIN life AS l
-        ON m.thread_index = l.thread_index AND m.event_id >= l.from_event_id
+    ASOF LEFT JOIN life AS l ON m.thread_index = l.thread_index AND m.event_id >= l.from_event_id
 ),
 moment AS (
     SELECT
@@ -91,10 +89,7 @@ agreement AS (
     GROUP BY ALL
 )
 SELECT
-    c.candidate_number,
-    c.trace_index,
-    c.clock_key,
-    c.shift_ns,
+    c.candidate_number, c.trace_index, c.clock_key, c.shift_ns,
     coalesce(a.event_count, 0) AS event_count,
     coalesce(a.agreeing_count, 0) AS agreeing_count,
     coalesce(a.unknown_count, 0) AS unknown_count,

@@ -1,4 +1,3 @@
--- name: staging.schedule_candidate
 -- description: Clocks that a kernel trace may have used, and what has to be added to its times in
 --     each case. LTTng names the clock. perf names none: its times count from the origin of the
 --     clock, or from the epoch.
@@ -18,14 +17,10 @@ ros AS (
 )
 SELECT
     row_number() OVER (ORDER BY trace_index, clock_key, shift_ns) AS candidate_number,
-    trace_index,
-    clock_key,
-    shift_ns,
-    has_cpus
+    trace_index, clock_key, shift_ns, has_cpus
 FROM (
     SELECT DISTINCT
-        k.trace_index,
-        r.clock_key,
+        k.trace_index, r.clock_key,
         CASE WHEN k.clock_key = r.clock_key OR s.is_of_epoch THEN 0
             ELSE r.clock_origin_ns - k.clock_origin_ns END AS shift_ns,
         k.has_cpus

@@ -1,12 +1,10 @@
--- name: staging.schedule_moment
 -- description: What a kernel trace says of the CPU at each event of a ROS process: which thread
 --     ran there. The next switch tells, and the one before it has to say the same: else some switch
 --     was not recorded, and what ran is not known (`contradiction_id`: the next switch). `tid` left
 --     the CPU there.
 -- grain: one row per event and candidate that covers it
 -- when: staging.schedule_candidate
-SELECT
-    e.candidate_number, e.event_id, e.thread_index, e.at_ns, w.tid, w.contradiction_id
+SELECT e.candidate_number, e.event_id, e.thread_index, e.at_ns, w.tid, w.contradiction_id
 FROM (
     -- Few and narrow columns here and below: all events and all switches are sorted.
     SELECT

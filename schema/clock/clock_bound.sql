@@ -1,5 +1,3 @@
--- name: derive.clock_bound
--- kind: macro
 -- description: Bounds of the difference between two clocks, from messages and packets. Nothing is
 --     received before it was sent. Hence each of them bounds the difference that turns times of
 --     `clock_id` into times of `other_clock_id`. A message to `clock_id` gives a lower bound, a

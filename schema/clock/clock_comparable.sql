@@ -1,4 +1,3 @@
--- name: derive.clock_comparable
 -- description: Whether times of two processes can be compared: they have one clock, or one of the
 --     two clocks was brought to the other's time.
 -- grain: one row per ordered pair of processes of a run
@@ -9,9 +8,7 @@ WITH timed AS (
     JOIN store.clock AS c ON h.clock_id = c.clock_id
 )
 SELECT
-    a.run_id,
-    a.process_id,
-    b.process_id AS other_process_id,
+    a.run_id, a.process_id, b.process_id AS other_process_id,
     a.clock_id = b.clock_id OR a.method <> 'none' OR b.method <> 'none' AS is_comparable
 FROM timed AS a
 JOIN timed AS b ON a.run_id = b.run_id

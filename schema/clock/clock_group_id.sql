@@ -1,5 +1,3 @@
--- name: derive.clock_group_id
--- kind: macro
 -- description: Clocks with the same number are corrected to the same clock, so that their times
 --     compare. A clock that is not corrected has a number of its own.
 CREATE OR REPLACE MACRO derive.clock_group_id(clock_id, reference_clock_id) AS

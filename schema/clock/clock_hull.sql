@@ -1,5 +1,3 @@
--- name: derive.clock_hull
--- kind: macro
 -- description: Corners of the convex hulls of the bounds between two clocks. Each direction has a
 --     hull: the lower envelope of the delays. A line fits the clocks if it lies between both hulls
 --     and is no steeper than clocks can drift apart. The first step drops each point that another
@@ -46,8 +44,7 @@ relevant AS (
     )
 ),
 thinned (round, clock_id, other_clock_id, sense, moment, bound) AS (
-    SELECT 0, clock_id, other_clock_id, sense, moment, bound
-    FROM relevant
+    SELECT 0, clock_id, other_clock_id, sense, moment, bound FROM relevant
     UNION ALL
     SELECT round + 1, clock_id, other_clock_id, sense, moment, bound
     FROM (

@@ -1,5 +1,3 @@
--- name: derive.clock_line
--- kind: macro
 -- description: The line that is chosen of all that are possible between two hulls: through the
 --     middle between them where they are nearest to each other, and as steep as their longest edge.
 --     With the lowest and the highest slope of a possible line. Where none is possible (`is_even`
@@ -93,9 +91,7 @@ SELECT
                     s.highest, n.steepest,
                     coalesce(
                         o.slope,
-                        (
-                            greatest(s.lowest, n.flattest) + least(s.highest, n.steepest)
-                        ) / 2
+                        (greatest(s.lowest, n.flattest) + least(s.highest, n.steepest)) / 2
                     )
                 )
             )

@@ -1,5 +1,3 @@
--- name: derive.clock_line_error
--- kind: macro
 -- description: How far a possible line is at most from the chosen one: at some moments, with
 --     straight lines in between. `edges` is the name of a table with the edges of hulls, `lines`
 --     that of one as derive.clock_line gives it, `extents` that of one with the begin_moment and
@@ -77,8 +75,7 @@ apart AS (
     GROUP BY k.clock_id, k.other_clock_id, k.moment
 )
 -- The greater of the two has a corner where they are equal.
-SELECT clock_id, other_clock_id, moment, greatest(below, above) AS error
-FROM apart
+SELECT clock_id, other_clock_id, moment, greatest(below, above) AS error FROM apart
 UNION ALL
 SELECT
     clock_id, other_clock_id, moment + share * (next_moment - moment),

@@ -1,18 +1,15 @@
--- name: derive.clock_pair
--- kind: macro
 -- description: How the times of one clock become those of another, from the messages and packets
 --     between them in both directions. Every line between the two hulls is possible that is no
 --     steeper than clocks can drift apart. The hulls are nearest to each other at the shortest
---     round trip that was observed, once the drift is taken out. There, the middle between them
---     is the offset, and half the distance bounds its error. The drift is that of the possible
---     line through this middle that is parallel to the longest edge of the hulls; the steepest
---     and the flattest possible line bound its error (Duda 1987; Poirier, Roy and Dagenais 2010;
---     Jabbarifar and Dagenais 2014). `bounds` holds how far a possible line is at most from the
---     chosen one: at some moments, with straight lines in between. It grows where nothing passes
---     one way. Where no line is possible, the clocks do not run evenly, or drift apart faster
---     than clocks do. Then the line that misses least is given, and its error at any time is
---     bounded by the fastest message or packet of each stretch. Without any in one of the
---     directions, all is NULL.
+--     round trip that was observed, once the drift is taken out. There, the middle between them is
+--     the offset, and half the distance bounds its error. The drift is that of the possible line
+--     through this middle that is parallel to the longest edge of the hulls; the steepest and the
+--     flattest possible line bound its error (Duda 1987; Poirier, Roy and Dagenais 2010; Jabbarifar
+--     and Dagenais 2014). `bounds` holds how far a possible line is at most from the chosen one: at
+--     some moments, with straight lines in between. It grows where nothing passes one way. Where no
+--     line is possible, the clocks do not run evenly, or drift apart faster than clocks do. Then
+--     the line that misses least is given, and its error at any time is bounded by the fastest
+--     message or packet of each stretch. Without any in one of the directions, all is NULL.
 -- grain: one row per pair of clocks with messages or packets between them
 CREATE OR REPLACE MACRO derive.clock_pair(only_run) AS TABLE
 WITH corner AS MATERIALIZED (
@@ -52,9 +49,7 @@ edge AS MATERIALIZED (
     FROM corner
     GROUP BY clock_id, other_clock_id, sense
 ),
-line AS MATERIALIZED (
-    FROM derive.clock_line('corner', 'edge')
-),
+line AS MATERIALIZED (FROM derive.clock_line('corner', 'edge')),
 -- How far the clocks can be from the line at any time, where no line is possible.
 miss AS (
     SELECT clock_id, other_clock_id, ceil(max(abs(least_miss))) AS greatest_miss
@@ -124,11 +119,7 @@ known AS (
     GROUP BY clock_id, other_clock_id
 )
 SELECT
-    p.clock_id,
-    p.other_clock_id,
-    p.received_count,
-    p.sent_count,
-    p.received_packet_count,
+    p.clock_id, p.other_clock_id, p.received_count, p.sent_count, p.received_packet_count,
     p.sent_packet_count,
     p.base_ns + l.moment::BIGINT AS reference_ns,
     p.base_bound_ns + l.middle::BIGINT AS offset_ns,
@@ -139,9 +130,7 @@ SELECT
             ceil(greatest(l.highest * 1e9 - l.drift_ppb, l.drift_ppb - l.lowest * 1e9)), 1
         )
     END::BIGINT AS drift_uncertainty_ppb,
-    l.is_even,
-    k.greatest_uncertainty_ns,
-    k.bounds
+    l.is_even, k.greatest_uncertainty_ns, k.bounds
 FROM pair AS p
 LEFT JOIN line AS l ON p.clock_id = l.clock_id AND p.other_clock_id = l.other_clock_id
 LEFT JOIN miss AS m ON p.clock_id = m.clock_id AND p.other_clock_id = m.other_clock_id

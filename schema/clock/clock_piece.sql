@@ -1,4 +1,3 @@
--- name: derive.clock_piece
 -- description: The bound of the error of the correction of a clock, as straight lines. It is
 --     `uncertainty_ns` at `at_ns`, as the clock showed it, and changes by `growth` per time from
 --     `from_ns` until the next row. Outside the moments for which a bound is known, it grows as
@@ -20,8 +19,6 @@ SELECT
 FROM bound
 WINDOW along AS (PARTITION BY clock_id ORDER BY at_ns)
 UNION ALL
-SELECT
-    run_id, clock_id, -9223372036854775808, min(at_ns), arg_min(uncertainty_ns, at_ns),
-    -fastest
+SELECT run_id, clock_id, -9223372036854775808, min(at_ns), arg_min(uncertainty_ns, at_ns), -fastest
 FROM bound
 GROUP BY run_id, clock_id, fastest

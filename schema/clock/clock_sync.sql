@@ -1,5 +1,3 @@
--- name: derive.clock_sync
--- kind: macro
 -- description: How the times of each clock become those of a reference. The reference is the
 --     first of the clocks that messages or packets in both directions connect. A clock that
 --     exchanges none with the reference is joined through others, along the chain with the
@@ -24,16 +22,13 @@ step AS MATERIALIZED (
     FROM pair
     UNION ALL
     SELECT
-        other_clock_id,
-        clock_id,
+        other_clock_id, clock_id,
         reference_ns + offset_ns,
         -offset_ns,
         1 / (1 + drift) - 1,
         ceil(uncertainty_ns / (1 + drift - drift_uncertainty))::BIGINT,
         drift_uncertainty / ((1 + drift) * (1 + drift - drift_uncertainty)),
-        is_even,
-        has_packets,
-        greatest_uncertainty_ns
+        is_even, has_packets, greatest_uncertainty_ns
     FROM pair
 ),
 chain (
@@ -48,10 +43,7 @@ chain (
     UNION
     (
         SELECT
-            c.root_id,
-            s.clock_id,
-            c.clock_id,
-            s.reference_ns,
+            c.root_id, s.clock_id, c.clock_id, s.reference_ns,
             s.offset_ns + c.offset_ns
             + round(c.drift * (s.reference_ns + s.offset_ns - c.reference_ns))::BIGINT,
             s.drift + c.drift + s.drift * c.drift,
@@ -84,9 +76,7 @@ sync AS MATERIALIZED (
 ),
 -- Each clock and those on the way from it to the root, but for the root itself.
 way (clock_id, via_id, next_clock_id) AS (
-    SELECT clock_id, clock_id, next_clock_id
-    FROM sync
-    WHERE next_clock_id IS NOT NULL
+    SELECT clock_id, clock_id, next_clock_id FROM sync WHERE next_clock_id IS NOT NULL
     UNION ALL
     SELECT w.clock_id, s.clock_id, s.next_clock_id
     FROM way AS w
@@ -99,8 +89,7 @@ step_bound AS (
     FROM pair AS p, unnest(p.bounds) AS bound (b)
     UNION ALL
     SELECT
-        p.other_clock_id,
-        p.clock_id,
+        p.other_clock_id, p.clock_id,
         b.at_ns + p.offset_ns + round(p.drift * (b.at_ns - p.reference_ns))::BIGINT,
         b.uncertainty_ns * (1 + 2 * derive.clock_drift_limit())
     FROM pair AS p, unnest(p.bounds) AS bound (b)
@@ -168,17 +157,13 @@ summed AS (
     GROUP BY a.clock_id, a.at_ns
 )
 SELECT
-    s.clock_id,
-    s.root_id AS reference_clock_id,
-    s.reference_ns,
-    s.offset_ns,
+    s.clock_id, s.root_id AS reference_clock_id, s.reference_ns, s.offset_ns,
     s.drift_ppb::BIGINT AS drift_ppb,
     s.uncertainty_ns,
     CASE WHEN s.is_even THEN ceil(
         s.drift_uncertainty * 1e9 + abs(s.drift * 1e9 - s.drift_ppb)
     ) END::BIGINT AS drift_uncertainty_ppb,
-    s.has_packets,
-    u.bounds
+    s.has_packets, u.bounds
 FROM sync AS s
 LEFT JOIN (
     SELECT

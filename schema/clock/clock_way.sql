@@ -1,4 +1,3 @@
--- name: derive.clock_way
 -- description: What was sent on one clock and received on another, where this is known without
 --     comparing the two: messages matched by their stamps where there is no other candidate,
 --     service requests and responses, and network packets. A request or response may be reported

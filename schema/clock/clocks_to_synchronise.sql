@@ -1,4 +1,3 @@
--- name: derive.clocks_to_synchronise
 -- description: Runs with several clocks, for which synchronisation by messages was asked.
 -- grain: one row per run
 SELECT s.run_id

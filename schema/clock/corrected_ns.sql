@@ -1,5 +1,3 @@
--- name: derive.corrected_ns
--- kind: macro
 -- description: A time of some clock on the common time axis: its offset, and its drift since the
 --     reference.
 CREATE OR REPLACE MACRO derive.corrected_ns(time_ns, offset_ns, drift_ppb, reference_ns) AS

@@ -1,4 +1,3 @@
--- name: derive.process_clock
 -- description: The clock of each process, and how its times are corrected.
 -- grain: one row per process
 SELECT p.process_id, c.clock_id, c.offset_ns, c.drift_ppb, c.reference_ns

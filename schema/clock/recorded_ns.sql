@@ -1,5 +1,3 @@
--- name: derive.recorded_ns
--- kind: macro
 -- description: What a clock showed at a time of the common axis: the inverse of
 --     derive.corrected_ns.
 CREATE OR REPLACE MACRO derive.recorded_ns(time_ns, offset_ns, drift_ppb, reference_ns) AS

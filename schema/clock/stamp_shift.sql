@@ -1,4 +1,3 @@
--- name: derive.stamp_shift
 -- description: What to add to a stamp made on a host to get the time of its trace: stamps are of
 --     the clock that can be set, which traces do not follow. It is given as the least and the
 --     greatest difference between the publication's layers and its stamp in ten seconds, so that
@@ -7,8 +6,7 @@
 -- grain: one row per host and ten seconds
 WITH difference AS (
     SELECT
-        l.run_id,
-        p.host_id,
+        l.run_id, p.host_id,
         t.source_timestamp_ns // 10_000_000_000 AS bucket,
         min(coalesce(b.dds_ns, b.rmw_ns, b.end_ns) - t.source_timestamp_ns) AS shift_ns,
         max(coalesce(b.dds_ns, b.rmw_ns, b.end_ns) - t.source_timestamp_ns) AS greatest_shift_ns
@@ -20,13 +18,11 @@ WITH difference AS (
     GROUP BY l.run_id, p.host_id, bucket
 )
 SELECT
-    run_id,
-    host_id,
+    run_id, host_id,
     CASE
         WHEN row_number() OVER (PARTITION BY run_id, host_id ORDER BY bucket) > 1
             THEN bucket * 10_000_000_000
         ELSE 0
     END AS from_ns,
-    shift_ns,
-    greatest_shift_ns
+    shift_ns, greatest_shift_ns
 FROM difference

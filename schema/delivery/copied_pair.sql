@@ -1,4 +1,3 @@
--- name: derive.copied_pair
 -- description: Placeholders that get copies of what a publisher passes on through ring buffers.
 --     Each is one subscription with the reader of the buffer, but nothing in the trace joins the
 --     two. So it is not known what the placeholder should have taken.

@@ -1,4 +1,3 @@
--- name: derive.delimited_run
 -- description: Runs with both events between which executors wait: that they wait, and that they
 --     look for work. Where a recording leaves out one of them, the next event of a thread does not
 --     show how long its state lasted.

@@ -1,5 +1,3 @@
--- name: derive.delivery_limit
--- kind: macro
 -- description: All numbers in the rules about missing deliveries; each with its reason.
 CREATE OR REPLACE MACRO derive.delivery_limit() AS {
     -- Half of the messages arrive within the usual time, hardly any after ten times that. A reader

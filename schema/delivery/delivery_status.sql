@@ -1,5 +1,3 @@
--- name: derive.delivery_status
--- kind: macro
 -- description: What a reason for a missing delivery means: the queue was full, the message was lost
 --     on the way, the two were not connected yet or any more, the recording ended before it could
 --     be taken, or the trace does not show it.

@@ -1,4 +1,3 @@
--- name: derive.empty_take
 -- description: Attempts to take a message that had expired: the reader was woken for it and found
 --     none. Attempts inside of callbacks do not count, since a callback may take by hand to look
 --     whether there is a message. Nor do those behind a callback that was never seen to end, since
@@ -13,8 +12,7 @@ begun AS (
         c.run_id, c.thread_id, max(c.start_ns) AS start_ns,
         arg_max_null(c.end_ns, c.start_ns) AS end_ns
     FROM store.callback_instance AS c
-    LEFT JOIN tried AS t
-        ON c.thread_id = t.thread_id AND derive.stretch(c.start_ns) = t.stretch
+    LEFT JOIN tried AS t ON c.thread_id = t.thread_id AND derive.stretch(c.start_ns) = t.stretch
     GROUP BY
         c.run_id, c.thread_id, derive.stretch(c.start_ns),
         CASE WHEN t.stretch IS NOT NULL THEN c.callback_instance_id END

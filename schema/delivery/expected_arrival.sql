@@ -1,4 +1,3 @@
--- name: derive.expected_arrival
 -- description: When each message could be received at the earliest, on the clock of those who
 --     subscribe to its topic: at the end of its publication. A message that goes through a ring
 --     buffer counts from `rclcpp_intra_publish` on, since it may be taken before publish() returns.
@@ -32,8 +31,7 @@ FROM sent
 WHERE from_clock_id = clock_id
 UNION ALL
 SELECT
-    s.run_id, s.publication_id, s.publisher_id, s.topic_name, s.source_timestamp_ns,
-    s.clock_id,
+    s.run_id, s.publication_id, s.publisher_id, s.topic_name, s.source_timestamp_ns, s.clock_id,
     coalesce(
         s.end_ns + c.shift_ns,
         CASE

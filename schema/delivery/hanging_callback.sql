@@ -1,4 +1,3 @@
--- name: derive.hanging_callback
 -- description: Threads that did not come back from a callback: the last one that they began has no
 --     end, and nothing shows that its thread did anything else afterwards. A callback is left
 --     out if a gap may hide its end, or if its process recorded no end of any callback.

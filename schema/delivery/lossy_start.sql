@@ -1,4 +1,3 @@
--- name: derive.lossy_start
 -- description: Processes that may have lost events while they were created: a gap other than a
 --     pause lies before the first callback instance, or before the process was seen at all. If its
 --     first node was seen to be created before its first callback instance, any gap counts.
@@ -11,13 +10,9 @@ WITH loss AS (
     GROUP BY r.recording_id
 ),
 started AS (
-    SELECT process_id, min(start_ns) AS start_ns
-    FROM store.callback_instance
-    GROUP BY process_id
+    SELECT process_id, min(start_ns) AS start_ns FROM store.callback_instance GROUP BY process_id
 ),
-born AS (
-    SELECT process_id, min(created_ns) AS created_ns FROM store.node GROUP BY process_id
-)
+born AS (SELECT process_id, min(created_ns) AS created_ns FROM store.node GROUP BY process_id)
 SELECT DISTINCT p.run_id, p.process_id
 FROM derive.process_presence AS p
 JOIN loss AS l ON p.recording_id = l.recording_id

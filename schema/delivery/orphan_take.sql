@@ -1,5 +1,3 @@
--- name: derive.orphan_take
--- kind: macro
 -- description: Why the publication of a take is not known: the first reason that holds. The stamp
 --     is compared on the host of each process that could have sent it: those with a publisher of
 --     the topic (known senders), those with one whose topic is not known or whose initialisation
@@ -112,9 +110,7 @@ incomplete AS (
     UNION
     SELECT process_id FROM store.node WHERE run_id = only_run AND is_inferred
 ),
-topic AS (
-    SELECT DISTINCT topic_name FROM orphan WHERE topic_name IS NOT NULL
-),
+topic AS (SELECT DISTINCT topic_name FROM orphan WHERE topic_name IS NOT NULL),
 candidate AS (
     SELECT topic_name, process_id, created_ns, true AS is_known, is_silent
     FROM sending
@@ -127,9 +123,7 @@ candidate AS (
         SELECT (topic_name, process_id) FROM sending WHERE topic_name IS NOT NULL
     )
     UNION ALL
-    SELECT NULL, process_id, min(created_ns), true, false
-    FROM sending
-    GROUP BY process_id
+    SELECT NULL, process_id, min(created_ns), true, false FROM sending GROUP BY process_id
 ),
 sender AS (
     SELECT
@@ -171,9 +165,7 @@ judged AS (
             bool_and(s.at_ns < s.recorded_from_ns)
         ) AS is_before_tracing,
         bool_or(
-            coalesce(
-                g.covered_until_ns >= s.at_ns - derive.delivery_limit().stamp_slack_ns, false
-            )
+            coalesce(g.covered_until_ns >= s.at_ns - derive.delivery_limit().stamp_slack_ns, false)
         ) AS has_gap,
         coalesce(
             bool_and(s.last_seen_ns < s.latest_ns) FILTER (WHERE s.is_known),
@@ -211,8 +203,7 @@ buffered AS (
         coalesce(b.end_ns, o.created_ns, 0) AS since_ns
     FROM orphan AS o
     LEFT JOIN presence AS p ON o.process_id = p.process_id
-    ASOF LEFT JOIN passed AS b
-        ON o.subscription_id = b.subscription_id AND o.taken_ns > b.taken_ns
+    ASOF LEFT JOIN passed AS b ON o.subscription_id = b.subscription_id AND o.taken_ns > b.taken_ns
     WHERE o.method = 'ring_buffer'
 ),
 kept AS (
@@ -237,8 +228,7 @@ replaced AS (
 )
 SELECT
     only_run::BIGINT AS run_id,
-    o.take_id,
-    o.subscription_id,
+    o.take_id, o.subscription_id,
     CASE
         WHEN k.has_gap THEN 'publisher_gap'
         WHEN k.is_before_tracing THEN 'before_tracing'

@@ -1,5 +1,3 @@
--- name: derive.own_topic
--- kind: macro
 -- description: What messages go through: a topic of ROS 2, or one of Agnocast of the same name on
 --     one kernel. Only a bridge passes messages on to another one.
 CREATE OR REPLACE MACRO derive.own_topic(topic_name, is_agnocast, clock_id) AS

@@ -1,5 +1,3 @@
--- name: derive.process_gap
--- kind: macro
 -- description: When each process may have done something that is not in its traces, for ASOF
 --     joins as with derive.recording_gap: in gaps of its recordings; before its first event, if
 --     it existed then; and between two recordings. The tracer tells one process after the other
@@ -45,8 +43,7 @@ active AS MATERIALIZED (
 ),
 absence AS (
     SELECT
-        p.run_id,
-        p.process_id,
+        p.run_id, p.process_id,
         coalesce(b.at_ns, p.start_ns) AS start_ns,
         coalesce(a.at_ns, p.end_ns) AS end_ns
     FROM pause AS p
@@ -78,9 +75,7 @@ gap AS (
     WHERE begin_ns > previous_end_ns
 )
 SELECT
-    run_id,
-    process_id,
-    start_ns,
+    run_id, process_id, start_ns,
     max(end_ns) OVER (
         PARTITION BY run_id, process_id ORDER BY start_ns, end_ns ROWS UNBOUNDED PRECEDING
     ) AS covered_until_ns

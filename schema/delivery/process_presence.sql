@@ -1,4 +1,3 @@
--- name: derive.process_presence
 -- description: Where each process was recorded, and from when on. A session that has nothing but
 --     the initialisation of the process does not count: what the process did then is not in it. A
 --     process that existed before is recorded from its first event on, because the tracer tells
@@ -7,9 +6,7 @@
 -- grain: one row per process and recording (the chunks of one trace) that it did something in
 WITH recording AS (
     SELECT
-        r.run_id,
-        r.trace_id,
-        r.recording_id,
+        r.run_id, r.trace_id, r.recording_id,
         min(t.start_ns) OVER chunks AS begin_ns,
         max(t.end_ns) OVER chunks AS end_ns
     FROM derive.recording AS r
@@ -33,8 +30,7 @@ instance AS (
     FROM store.take
     GROUP BY run_id, process_id, trace_id
     UNION ALL
-    SELECT
-        run_id, process_id, trace_id, min(start_ns), max(greatest(start_ns, coalesce(end_ns, 0)))
+    SELECT run_id, process_id, trace_id, min(start_ns), max(greatest(start_ns, coalesce(end_ns, 0)))
     FROM store.callback_instance
     GROUP BY run_id, process_id, trace_id
 ),
@@ -54,11 +50,7 @@ creation AS (
     SELECT run_id, process_id, created_ns FROM store.subscription
 )
 SELECT
-    s.run_id,
-    s.process_id,
-    s.recording_id,
-    s.begin_ns,
-    s.end_ns,
+    s.run_id, s.process_id, s.recording_id, s.begin_ns, s.end_ns,
     CASE WHEN p.first_seen_ns >= s.begin_ns THEN p.first_seen_ns ELSE s.first_ns END AS first_ns,
     s.last_ns,
     -- Its first object was seen to be created before it did anything.

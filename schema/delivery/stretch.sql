@@ -1,5 +1,3 @@
--- name: derive.stretch
--- kind: macro
 -- description: The number of the stretch of time that a moment is in: a tenth of a second. Where
 --     only a few messages are asked for, what is around them is read one by one. Everywhere else
 --     one row stands for all of a stretch. The length changes no answer. It only decides how many

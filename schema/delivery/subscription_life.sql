@@ -1,15 +1,10 @@
--- name: derive.subscription_life
 -- description: How long each subscription could take messages, on the clock of its host: from its
 --     creation to the last event of the threads that read it, or until its handle was used again.
 --     A placeholder for the reader of a ring buffer is left out: it may be the same subscription
 --     as the one for what comes through the middleware, so that it is not known what it should
 --     have got.
 -- grain: one row per subscription with a handle
-WITH host_end AS (
-    SELECT host_id, max(last_seen_ns) AS end_ns
-    FROM store.process
-    GROUP BY host_id
-),
+WITH host_end AS (SELECT host_id, max(last_seen_ns) AS end_ns FROM store.process GROUP BY host_id),
 reader AS (
     SELECT
         r.subscription_id,
@@ -38,17 +33,13 @@ showing AS (
     WHERE t.source_timestamp_ns IS NOT NULL
 )
 SELECT
-    s.run_id,
-    s.subscription_id,
+    s.run_id, s.subscription_id,
     derive.own_topic(s.topic_name, s.is_agnocast, h.clock_id) AS topic_name,
-    s.is_agnocast,
-    s.process_id,
-    h.clock_id,
+    s.is_agnocast, s.process_id, h.clock_id,
     nullif(s.queue_depth, 0) AS queue_depth,
     s.created_ns,
     coalesce(r.last_seen_ns, p.last_seen_ns) AS last_seen_ns,
-    x.replaced_ns,
-    e.end_ns AS host_end_ns,
+    x.replaced_ns, e.end_ns AS host_end_ns,
     CASE WHEN r.thread_count = 1 THEN r.thread_id END AS only_thread_id,
     p.host_id IN (SELECT host_id FROM showing) AS shows_takes
 FROM store.subscription AS s

@@ -1,4 +1,3 @@
--- name: derive.subscription_reader
 -- description: Threads that take for a subscription: those that did, and those of the same
 --     executor. If a subscription never took anything: every executor thread of its process.
 -- grain: one row per subscription and thread

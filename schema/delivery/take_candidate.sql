@@ -1,5 +1,3 @@
--- name: derive.take_candidate
--- kind: macro
 -- description: Publications that a take without a link could come from: its stamp fits them, but
 --     none of them could be chosen.
 -- grain: one row per take without a link and publication
@@ -13,7 +11,6 @@ WITH orphan AS (
 )
 SELECT o.run_id, o.take_id, b.publication_id
 FROM orphan AS o
-JOIN store.publication AS b
-    ON o.run_id = b.run_id AND o.source_timestamp_ns = b.source_timestamp_ns
+JOIN store.publication AS b ON o.run_id = b.run_id AND o.source_timestamp_ns = b.source_timestamp_ns
 LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
 WHERE b.run_id = only_run AND coalesce(o.topic_name = p.topic_name, true)

@@ -1,5 +1,3 @@
--- name: derive.undelivered
--- kind: macro
 -- description: Why a subscription did not take a message of its topic; the first reason that holds.
 --     Everything is compared on the clock of the receiver. A message is lost only between two of
 --     its publisher that were taken: without one, the two were never connected; before the first,
@@ -180,21 +178,17 @@ while_set AS MATERIALIZED (
 ),
 known AS (
     SELECT
-        m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id,
-        m.arrival_ns, m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns,
-        s.last_seen_ns, s.replaced_ns, s.host_end_ns, s.shows_takes, s.is_agnocast,
-        m.arrival_ns
+        m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id, m.arrival_ns,
+        m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns, s.last_seen_ns, s.replaced_ns,
+        s.host_end_ns, s.shows_takes, s.is_agnocast, m.arrival_ns
             - CASE
                 WHEN m.has_one_clock OR e.arrival_ns IS NULL THEN 0
                 ELSE derive.delivery_limit().stamp_slack_ns
             END AS least_arrival_ns,
         coalesce(c.longest_ns, derive.delivery_limit().longest_ns) AS longest_ns,
         coalesce(c.patience_ns, derive.delivery_limit().longest_ns) AS patience_ns,
-        c.usual_ns,
-        p.taken_ns AS publisher_taken_ns,
-        p.arrival_ns AS publisher_arrival_ns,
-        n.taken_ns AS any_taken_ns,
-        n.arrival_ns AS next_arrival_ns,
+        c.usual_ns, p.taken_ns AS publisher_taken_ns, p.arrival_ns AS publisher_arrival_ns,
+        n.taken_ns AS any_taken_ns, n.arrival_ns AS next_arrival_ns,
         e.arrival_ns > m.arrival_ns AS is_before_first,
         -- From when on publisher and subscription could know each other: they need not have before.
         greatest(
@@ -231,9 +225,7 @@ due AS MATERIALIZED (
         ) AS publisher_row_length
     FROM known
 ),
-due_stretch AS (
-    SELECT DISTINCT subscription_id, derive.stretch(due_ns) AS stretch FROM due
-),
+due_stretch AS (SELECT DISTINCT subscription_id, derive.stretch(due_ns) AS stretch FROM due),
 -- Of a stretch in which no message is due, only the first wait can be the next one after any.
 condensed_wait AS (
     SELECT w.subscription_id, min(w.end_ns) AS end_ns, arg_min(w.start_ns, w.end_ns) AS start_ns
@@ -292,8 +284,7 @@ bounded AS MATERIALIZED (
 -- The place of each missing message among those of its topic, and of the last one before it was
 -- gone. Of any other stretch of time the number of messages is enough.
 wanted_stretch AS (
-    SELECT DISTINCT
-        topic_name, clock_id, derive.stretch(unnest([arrival_ns, gone_ns])) AS stretch
+    SELECT DISTINCT topic_name, clock_id, derive.stretch(unnest([arrival_ns, gone_ns])) AS stretch
     FROM bounded
 ),
 ordered AS MATERIALIZED (
@@ -344,20 +335,15 @@ facts AS (
     ASOF LEFT JOIN (SELECT * FROM derive.empty_take WHERE run_id = only_run) AS f
         ON b.subscription_id = f.subscription_id AND b.arrival_ns <= f.failed_ns
     ASOF LEFT JOIN (
-        SELECT subscription_id, taken_ns, false AS for_no_stamp
-        FROM unidentified
-        WHERE has_no_stamp
+        SELECT subscription_id, taken_ns, false AS for_no_stamp FROM unidentified WHERE has_no_stamp
         UNION ALL
-        SELECT subscription_id, taken_ns, true
-        FROM unidentified
+        SELECT subscription_id, taken_ns, true FROM unidentified
     ) AS u
         ON b.subscription_id = u.subscription_id
         AND b.has_no_stamp = u.for_no_stamp
         AND b.least_arrival_ns <= u.taken_ns
     ASOF LEFT JOIN ordered AS q
-        ON b.topic_name = q.topic_name
-        AND b.clock_id = q.clock_id
-        AND b.gone_ns >= q.arrival_ns
+        ON b.topic_name = q.topic_name AND b.clock_id = q.clock_id AND b.gone_ns >= q.arrival_ns
 ),
 -- What is said of several messages of a pair alike. Before the first that was taken: whether the
 -- queue had overflowed, so that as many newer ones had come as it holds (a queue of one always is
@@ -389,9 +375,7 @@ judged AS (
 )
 SELECT
     only_run::BIGINT AS run_id,
-    publication_id,
-    publisher_id,
-    subscription_id,
+    publication_id, publisher_id, subscription_id,
     CASE
         WHEN arrival_ns IS NULL THEN 'unknown'
         WHEN created_ns > arrival_ns AND may_be_kept THEN 'unknown'

@@ -1,5 +1,3 @@
--- name: derive.unlinked_take
--- kind: macro
 -- description: Takes whose publication is not known.
 -- grain: one row per such take
 CREATE OR REPLACE MACRO derive.unlinked_take(only_run) AS TABLE

@@ -1,4 +1,3 @@
--- name: derive.unseen_creation
 -- description: Processes with objects that were used, but were not seen to be created: how many,
 --     their kinds, and whether the events of their creation may have been lost. Objects of ROS
 --     itself do not count: /rosout is published on handles never initialised.

@@ -1,4 +1,3 @@
--- name: derive.ambiguous_effect
 -- description: Takes and publications that flows reach by a link that may be another one.
 -- grain: one row per take or publication
 SELECT run_id, 'take' AS kind, take_id AS id, candidate_count

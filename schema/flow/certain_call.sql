@@ -1,4 +1,3 @@
--- name: derive.certain_call
 -- description: What flows follow of the calls that threads make without a callback. Left out are
 --     those that the thread may have made by itself, and those of processes that are several.
 -- grain: one row per such call that is followed

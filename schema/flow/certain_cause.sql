@@ -1,4 +1,3 @@
--- name: derive.certain_cause
 -- description: Causal links that flows follow.
 -- grain: one row per causal link that is followed
 SELECT

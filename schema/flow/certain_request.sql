@@ -1,8 +1,6 @@
--- name: derive.certain_request
 -- description: Requests that callback instances sent, as flows follow them. What goes on for a
---     response follows from that (derive.certain_call). Where several
---     processes with equal ids cannot be told apart, a callback of another one may have sent them:
---     these are left out.
+--     response follows from that (derive.certain_call). Where several processes with equal ids
+--     cannot be told apart, a callback of another one may have sent them: these are left out.
 -- grain: one row per such request that is followed
 SELECT l.run_id, l.request_id, l.callback_instance_id
 FROM store.link_request AS l

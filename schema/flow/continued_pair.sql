@@ -1,4 +1,3 @@
--- name: derive.continued_pair
 -- description: Subscriptions and publishers that flows go on through, whatever the message: the
 --     pairs of derive.flow_continuation, which are much cheaper to find than its rows.
 -- grain: one row per subscription and publisher that a message of it led to
@@ -7,9 +6,7 @@ WITH pair AS (
     FROM derive.certain_cause
     WHERE take_id IS NOT NULL
     UNION
-    SELECT run_id, subscription_id, publisher_id
-    FROM store.flow_call
-    WHERE take_id IS NOT NULL
+    SELECT run_id, subscription_id, publisher_id FROM store.flow_call WHERE take_id IS NOT NULL
 )
 SELECT p.run_id, p.subscription_id, p.publisher_id
 FROM pair AS p

@@ -1,5 +1,3 @@
--- name: derive.first_three
--- kind: macro
 -- description: Names of a group in words: the first three, and how many more there are.
 CREATE OR REPLACE MACRO derive.first_three(names) AS
 array_to_string(list(DISTINCT names ORDER BY names)[:3], ', ')

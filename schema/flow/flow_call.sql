@@ -1,5 +1,3 @@
--- name: derive.flow_call
--- kind: macro
 -- description: Publications that calls of services led to: of the services, and of clients that
 --     got the response. Each has the callback instance that called first, and the message that this
 --     instance was for, if any.

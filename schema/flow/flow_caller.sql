@@ -1,4 +1,3 @@
--- name: derive.flow_caller
 -- description: What callback instances led to by calling services, with the instance that called
 --     first: it was called by none itself. A request leads to the instance of the service callback,
 --     or is handled without one; its response leads to what the client does with it; both may call
@@ -16,8 +15,7 @@ answer AS (
     FROM store.callback_instance
     WHERE request_id IS NOT NULL
     UNION ALL
-    SELECT DISTINCT
-        run_id, taken_request_id, derive.vertex_key('request', taken_request_id)
+    SELECT DISTINCT run_id, taken_request_id, derive.vertex_key('request', taken_request_id)
     FROM derive.certain_call
     WHERE taken_request_id IS NOT NULL
     UNION ALL
@@ -48,8 +46,7 @@ caller (run_id, called_key, caller_key, client_id, services) AS (
     JOIN called AS d ON c.called_key = d.sender_key
 )
 SELECT
-    c.run_id,
-    c.called_key,
+    c.run_id, c.called_key,
     c.caller_key // 8 AS caller_id,
     list_prepend(coalesce(k.node_id, -k.process_id, 0), c.services)::BIGINT[] AS route
 FROM caller AS c

@@ -1,5 +1,3 @@
--- name: derive.flow_hop
--- kind: macro
 -- description: Steps of the computation graph that messages really took: from nowhere (a source) or
 --     a subscription through a publisher to a subscription, by a route of services
 --     (derive.flow_caller) or directly. A step is cached where the message may wait in the node for
@@ -7,9 +5,7 @@
 -- grain: one row per run, subscription before (NULL: source), route, publisher and subscription
 CREATE OR REPLACE MACRO derive.flow_hop(only_run) AS TABLE
 WITH carried AS (
-    SELECT DISTINCT publisher_id, subscription_id
-    FROM derive.flow_transport
-    WHERE run_id = only_run
+    SELECT DISTINCT publisher_id, subscription_id FROM derive.flow_transport WHERE run_id = only_run
 ),
 entered AS (
     SELECT

@@ -1,4 +1,3 @@
--- name: derive.flow_link
 -- description: All links in one shape: publication to take, take or request to the callback
 --     instance that it was for, callback instance (or a take without one) to publication,
 --     callback instance to request or response. Where no service callback was traced, a request
@@ -13,11 +12,7 @@ SELECT
 FROM store.link_transport
 WHERE NOT is_self_loop
 UNION ALL
-SELECT
-    run_id,
-    'take', take_id,
-    'callback_instance', callback_instance_id,
-    'callback'
+SELECT run_id, 'take', take_id, 'callback_instance', callback_instance_id, 'callback'
 FROM store.callback_instance
 WHERE take_id IS NOT NULL
 UNION ALL
@@ -29,18 +24,10 @@ SELECT
     kind
 FROM derive.flow_cause
 UNION ALL
-SELECT
-    run_id,
-    'callback_instance', callback_instance_id,
-    'request', request_id,
-    'direct'
+SELECT run_id, 'callback_instance', callback_instance_id, 'request', request_id, 'direct'
 FROM derive.certain_request
 UNION ALL
-SELECT
-    run_id,
-    'request', request_id,
-    'callback_instance', callback_instance_id,
-    'callback'
+SELECT run_id, 'request', request_id, 'callback_instance', callback_instance_id, 'callback'
 FROM store.callback_instance
 WHERE request_id IS NOT NULL
 UNION ALL
@@ -52,17 +39,8 @@ SELECT
 FROM store.link_response AS l
 JOIN store.response AS r ON l.response_id = r.response_id
 UNION ALL
-SELECT
-    run_id,
-    'request', request_id,
-    'response', response_id,
-    'service'
+SELECT run_id, 'request', request_id, 'response', response_id, 'service'
 FROM store.response
 WHERE callback_instance_id IS NULL AND request_id IS NOT NULL
 UNION ALL
-SELECT
-    run_id,
-    from_kind, from_id,
-    to_kind, to_id,
-    'take_adjacent'
-FROM derive.certain_call
+SELECT run_id, from_kind, from_id, to_kind, to_id, 'take_adjacent' FROM derive.certain_call

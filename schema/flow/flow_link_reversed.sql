@@ -1,4 +1,3 @@
--- name: derive.flow_link_reversed
 -- description: All links, from effect to cause.
 -- grain: one row per link
 SELECT

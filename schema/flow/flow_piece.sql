@@ -1,5 +1,3 @@
--- name: derive.flow_piece
--- kind: macro
 -- description: Parts of flows in pieces, between any two moments at which something begins or ends
 --     that may explain a part, each with what explains it best: the lowest priority, then the
 --     earliest.

@@ -1,15 +1,12 @@
--- name: derive.flow_root
--- kind: macro
--- description: Where the flow of each publication can be said to begin: with the callback
---     instance of the timer (or other callback without a message) that published it, or that
---     called the service that did; else with the publication itself. It is a source if no taken
---     message led to it. The route (derive.flow_caller) starts at the instance that called; if
---     none did, it is empty.
---     The flow of a message whose publisher is not traced begins with its take, or before that with
---     its stamp, if the clock of the publisher is that of the reader: of all messages that the
---     subscription took, the quickest came neither before its stamp nor later than a message needs.
---     Its publication and its publisher have no rows: the ids of the take and of the subscription
---     stand for them, below 0.
+-- description: Where the flow of each publication can be said to begin: with the callback instance
+--     of the timer (or other callback without a message) that published it, or that called the
+--     service that did; else with the publication itself. It is a source if no taken message led to
+--     it. The route (derive.flow_caller) starts at the instance that called; if none did, it is
+--     empty. The flow of a message whose publisher is not traced begins with its take, or before
+--     that with its stamp, if the clock of the publisher is that of the reader: of all messages
+--     that the subscription took, the quickest came neither before its stamp nor later than a
+--     message needs. Its publication and its publisher have no rows: the ids of the take and of the
+--     subscription stand for them, below 0.
 -- grain: one row per publication on a topic of the application, and per take of a message whose
 --     publisher is not traced
 CREATE OR REPLACE MACRO derive.flow_root(only_run) AS TABLE
@@ -51,9 +48,7 @@ cause AS (
 ),
 caused AS (
     SELECT
-        c.run_id,
-        c.publication_id,
-        c.publisher_id,
+        c.run_id, c.publication_id, c.publisher_id,
         bool_or(c.is_message) AS is_message,
         min(c.callback_instance_id) AS callback_instance_id
     FROM cause AS c
@@ -74,9 +69,7 @@ way AS (
     GROUP BY publication_id, caller_id
 )
 SELECT
-    r.run_id,
-    r.publication_id,
-    r.publisher_id,
+    r.run_id, r.publication_id, r.publisher_id,
     NOT r.is_message AS is_source,
     CASE WHEN r.callback_instance_id IS NULL THEN 'publication' ELSE 'callback_instance' END
         AS root_kind,
@@ -84,8 +77,7 @@ SELECT
     coalesce(w.route, []::BIGINT[]) AS route,
     NULL::BIGINT AS before_take_ns
 FROM root AS r
-LEFT JOIN way AS w
-    ON r.publication_id = w.publication_id AND r.callback_instance_id = w.caller_id
+LEFT JOIN way AS w ON r.publication_id = w.publication_id AND r.callback_instance_id = w.caller_id
 UNION ALL
 SELECT
     o.run_id,

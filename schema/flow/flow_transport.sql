@@ -1,4 +1,3 @@
--- name: derive.flow_transport
 -- description: Messages handed over on the topics of the application, with both objects. ROS's own
 --     topics, self loops and copies that no callback gets are no part of a path. A row is ambiguous
 --     where another publication may have been taken instead.
@@ -10,10 +9,7 @@ SELECT
 FROM store.link_transport AS l
 JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
 JOIN store.subscription AS s ON l.subscription_id = s.subscription_id
-WHERE NOT l.is_self_loop
-    AND l.is_copy IS NOT TRUE
-    AND NOT p.is_internal
-    AND NOT s.is_internal
+WHERE NOT l.is_self_loop AND l.is_copy IS NOT TRUE AND NOT p.is_internal AND NOT s.is_internal
 UNION ALL
 SELECT run_id, publication_id, publisher_id, root_id, -publisher_id, false
 FROM store.flow_root

@@ -1,5 +1,3 @@
--- name: derive.graph_reachable
--- kind: macro
 -- description: The vertices that can be reached from one vertex along the edges of a table or
 --     view with columns from_kind, from_id, to_kind, to_id. Each vertex comes once; the walk ends
 --     on any graph. Without max_depth, the cost grows with the edges alone. With it, the cost
@@ -13,9 +11,7 @@ CREATE OR REPLACE MACRO derive.graph_reachable(
 WITH RECURSIVE edge AS MATERIALIZED (
     SELECT from_kind, from_id, to_kind, to_id FROM query_table(edges)
 ),
-known AS (
-    SELECT count(*) AS edge_count FROM edge
-),
+known AS (SELECT count(*) AS edge_count FROM edge),
 reached (kind, id) AS (
     SELECT start_kind::VARCHAR, start_id::BIGINT
     FROM known

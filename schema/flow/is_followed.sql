@@ -1,5 +1,3 @@
--- name: derive.is_followed
--- kind: macro
 -- description: Whether flows follow a causal link. Without a declaration they do not if it has more
 --     than one candidate: the message may have led to nothing, or be of another process. Indirect
 --     links are as true as their declaration, and are followed.

@@ -1,5 +1,3 @@
--- name: derive.is_indirect
--- kind: macro
 -- description: Whether causal links of a kind come from a declaration: their messages wait in the
 --     node for others, for a timer or for a thread.
 CREATE OR REPLACE MACRO derive.is_indirect(kind) AS

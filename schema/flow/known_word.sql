@@ -1,5 +1,3 @@
--- name: derive.known_word
--- kind: macro
 -- description: True if a word is one of those that a macro knows. Else an error that names them:
 --     an unknown word must not be answered with no rows.
 CREATE OR REPLACE MACRO derive.known_word(parameter, word, known) AS

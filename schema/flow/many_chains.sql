@@ -1,5 +1,3 @@
--- name: derive.many_chains
--- kind: macro
 -- description: The run, if a search for all its paths (main.flow_path) may have to stop at the
 --     limits. Chains are only counted, by the subscription that they lead to, so that this costs
 --     little. One that comes to a subscription twice counts, too: there may be fewer.
@@ -24,6 +22,4 @@ reached AS (
     WHERE r.depth <= max_depth
     GROUP BY h.subscription_id, r.depth
 )
-SELECT only_run AS run_id
-FROM reached
-HAVING max(depth) > max_depth OR sum(number) > max_paths
+SELECT only_run AS run_id FROM reached HAVING max(depth) > max_depth OR sum(number) > max_paths

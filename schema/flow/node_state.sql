@@ -1,4 +1,3 @@
--- name: derive.node_state
 -- description: States of managed nodes, by the clock of their process. The state before the first
 --     change lasts from the creation of the node, or from the first event of its process. The last
 --     one lasts until the last event of the process. A state is left out where the next change

@@ -1,5 +1,3 @@
--- name: derive.place
--- kind: macro
 -- description: The topics and nodes that names or globs, separated by commas, mean. One that fits a
 --     topic means topics. Any other one means nodes, as a node is often called like the topic that
 --     it publishes.

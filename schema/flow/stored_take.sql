@@ -1,4 +1,3 @@
--- name: derive.stored_take
 -- description: Takes of messages that were published before their subscription existed, and were
 --     stored until then (a publisher that is transient local: latched). The creation of the
 --     subscription decides, so a message that was only sent before the two were connected is not
@@ -30,9 +29,7 @@ created AS (
     WHERE s.topic_name IS DISTINCT FROM '/parameter_events'
 ),
 -- Most publications are later than all creations: only the others are looked up.
-latest AS (
-    SELECT run_id, max(created_ns) AS created_ns FROM created GROUP BY run_id
-),
+latest AS (SELECT run_id, max(created_ns) AS created_ns FROM created GROUP BY run_id),
 sent AS (
     SELECT
         b.publication_id, p.clock_id, p.reference_clock_id, p.uncertainty_ns,

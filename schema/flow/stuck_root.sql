@@ -1,5 +1,3 @@
--- name: derive.stuck_root
--- kind: macro
 -- description: Why roots of paths did not arrive: the reason at the step at which they got stuck,
 --     and whether the recording may have cut them. It may where no message passed that step later,
 --     or, of messages that were published and not taken, none earlier (their readers were not there
@@ -49,13 +47,10 @@ stuck AS (
     LEFT JOIN (
         SELECT take_id, publisher_id, route, max(publication_id) AS publication_id
         FROM derive.flow_continuation
-        WHERE list_contains(runs, run_id)
-            AND take_id IN (SELECT last_take.take_id FROM progress)
+        WHERE list_contains(runs, run_id) AND take_id IN (SELECT last_take.take_id FROM progress)
         GROUP BY take_id, publisher_id, route
     ) AS c
-        ON p.last_take.take_id = c.take_id
-        AND n.publisher_id = c.publisher_id
-        AND n.route = c.route
+        ON p.last_take.take_id = c.take_id AND n.publisher_id = c.publisher_id AND n.route = c.route
 ),
 -- When messages passed each step, as far as a root got stuck there: each of one clock.
 delivered AS (
@@ -69,8 +64,7 @@ delivered AS (
     GROUP BY t.publisher_id, t.subscription_id
 ),
 continued AS (
-    SELECT
-        c.subscription_id, c.publisher_id, c.route, max(t.taken_ns) AS last_ns
+    SELECT c.subscription_id, c.publisher_id, c.route, max(t.taken_ns) AS last_ns
     FROM derive.flow_continuation AS c
     JOIN store.take AS t ON c.take_id = t.take_id
     WHERE list_contains(runs, c.run_id) AND c.publisher_id IN (SELECT publisher_id FROM stuck)
@@ -123,8 +117,7 @@ withheld AS (
     WHERE s.publisher_id IS NOT NULL AND s.publication_id IS NULL AND NOT s.is_cached
 )
 SELECT
-    s.path_id,
-    s.root_key,
+    s.path_id, s.root_key,
     CASE
         WHEN s.publisher_id IS NULL THEN 'callback_not_finished'
         WHEN s.publication_id IS NOT NULL THEN coalesce(u.reason, 'unknown')

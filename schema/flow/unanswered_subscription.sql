@@ -1,4 +1,3 @@
--- name: derive.unanswered_subscription
 -- description: Subscriptions at which flows seem to end: no take led to a publication, though the
 --     node has publishers, all on other topics. Messages without a known take are not looked at.
 --     Inputs of annotations are left out, and topics of ROS itself: logging is no effect.

@@ -1,5 +1,3 @@
--- name: derive.vertex_key
--- kind: macro
 -- description: One number for a vertex of a flow, so that walking over millions of them compares
 --     and keeps numbers only.
 CREATE OR REPLACE MACRO derive.vertex_key(kind, id) AS

@@ -1,4 +1,3 @@
--- name: overlap.alternating_name
 -- kind: inline
 -- description: Names of processes that run at the same time under one id. A thread that has such
 --     a name gets it back after another one. A thread that renames itself does so inside of

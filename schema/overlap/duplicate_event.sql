@@ -1,4 +1,3 @@
--- name: overlap.duplicate_event
 -- kind: inline
 -- description: Events to leave out because another session recorded them as well. Of the sessions
 --     that recorded a tracepoint on a thread, the one with most events of the thread counts; the

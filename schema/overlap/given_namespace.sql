@@ -1,4 +1,3 @@
--- name: overlap.given_namespace
 -- kind: inline
 -- description: PID namespaces for processes whose events have none. If the sessions of a host are
 --     of several containers, each container but the first gets a number. Else, if several processes
@@ -22,9 +21,7 @@ session AS (
 ),
 given AS (
     SELECT
-        s.session,
-        n.vpid,
-        n.procname,
+        s.session, n.vpid, n.procname,
         CASE
             WHEN s.has_containers THEN -s.container
             WHEN a.procname IS NOT NULL
@@ -37,6 +34,4 @@ given AS (
         ON n.host = a.host AND n.vpid = a.vpid AND n.procname = a.procname
     LEFT JOIN process_namespace AS p ON n.host = p.host AND n.vpid = p.vpid
 )
-SELECT session, vpid, procname, pid_ns
-FROM given
-WHERE pid_ns IS NOT NULL
+SELECT session, vpid, procname, pid_ns FROM given WHERE pid_ns IS NOT NULL

@@ -1,4 +1,3 @@
--- name: overlap.session_container
 -- kind: inline
 -- description: Containers of a host but the first one. Two sessions of the same threads are of one
 --     container, and so are two that a third one joins. Sessions of other threads under the same
@@ -17,11 +16,7 @@ reached (session, member) AS (
     FROM reached AS r
     JOIN twin AS t ON r.member = t.session
 ),
-grouped AS (
-    SELECT session, min(member) AS container
-    FROM reached
-    GROUP BY session
-)
+grouped AS (SELECT session, min(member) AS container FROM reached GROUP BY session)
 SELECT session, container
 FROM grouped
 WHERE container IN (

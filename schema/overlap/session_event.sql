@@ -1,4 +1,3 @@
--- name: overlap.session_event
 -- kind: inline
 -- description: Events of the sessions that recorded at the same time as another one, with their
 --     thread as the ids say: `thread` is the same number in all sessions. `thread_event` has the

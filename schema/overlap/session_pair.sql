@@ -1,4 +1,3 @@
--- name: overlap.session_pair
 -- kind: inline
 -- description: Pairs of sessions that recorded the same ids of threads at the same time, and
 --     whether these are the same threads: then most events that one of them recorded while both
@@ -56,8 +55,7 @@ right_counted AS (
     GROUP BY left_session, right_session, thread, tracepoint
 )
 SELECT
-    l.left_session,
-    l.right_session,
+    l.left_session, l.right_session,
     -- Where one of them lost events, those of the other have no twins.
     2 * sum(l.twin_count) >= sum(least(l.left_count, r.right_count))
         AS is_same

@@ -1,4 +1,3 @@
--- name: main.action_client
 -- description: Action clients: three clients of services and two subscriptions (action_server).
 -- grain: one row per action client
 -- column: run_id BIGINT  Run that the row belongs to
@@ -21,13 +20,9 @@ sent AS (
     GROUP BY client_id
 )
 SELECT
-    a.run_id,
-    a.goal_object_id AS action_client_id,
-    a.process_id, a.node_id, a.action_name,
-    a.cancel_object_id AS cancel_client_id,
-    a.result_object_id AS result_client_id,
-    a.feedback_object_id AS feedback_subscription_id,
-    a.status_object_id AS status_subscription_id,
+    a.run_id, a.goal_object_id AS action_client_id, a.process_id, a.node_id, a.action_name,
+    a.cancel_object_id AS cancel_client_id, a.result_object_id AS result_client_id,
+    a.feedback_object_id AS feedback_subscription_id, a.status_object_id AS status_subscription_id,
     c.created_ns,
     coalesce(q.number, CASE WHEN a.process_id IN (FROM derive.call_traced) THEN 0 END)
         AS goal_count

@@ -1,4 +1,3 @@
--- name: main.action_server
 -- description: Action servers. An action is three services and two topics: NAME/_action/send_goal,
 --     cancel_goal and get_result, NAME/_action/feedback and status.
 -- grain: one row per action server
@@ -26,19 +25,13 @@ taken AS (
 published AS (
     SELECT publisher_id, count(*) AS number
     FROM store.publication
-    WHERE publisher_id IN (
-        SELECT object_id FROM endpoint WHERE kind = 'publisher'
-    )
+    WHERE publisher_id IN (SELECT object_id FROM endpoint WHERE kind = 'publisher')
     GROUP BY publisher_id
 )
 SELECT
-    a.run_id,
-    a.goal_object_id AS action_server_id,
-    a.process_id, a.node_id, a.action_name,
-    a.cancel_object_id AS cancel_service_id,
-    a.result_object_id AS result_service_id,
-    a.feedback_object_id AS feedback_publisher_id,
-    a.status_object_id AS status_publisher_id,
+    a.run_id, a.goal_object_id AS action_server_id, a.process_id, a.node_id, a.action_name,
+    a.cancel_object_id AS cancel_service_id, a.result_object_id AS result_service_id,
+    a.feedback_object_id AS feedback_publisher_id, a.status_object_id AS status_publisher_id,
     s.created_ns,
     coalesce(q.number, CASE WHEN a.process_id IN (FROM derive.call_traced) THEN 0 END)
         AS goal_count,

@@ -1,4 +1,3 @@
--- name: main.annotation_firing
 -- description: Publications that annotations explain. One is complete if every input has a message:
 --     an indirect link comes from it, or the publishing callback instance was called with it. For
 --     partial_sync and approximate_sync: only publications from callback instances of inputs; all
@@ -12,11 +11,6 @@
 -- column: linked_count BIGINT  Inputs with a message
 -- column: is_complete BOOLEAN  Every input has a message
 SELECT
-    run_id,
-    annotation_id,
-    publication_id,
-    callback_instance_id,
-    input_count,
-    linked_count,
+    run_id, annotation_id, publication_id, callback_instance_id, input_count, linked_count,
     linked_count = input_count AS is_complete
 FROM derive.annotation_firing

@@ -1,4 +1,3 @@
--- name: main.arrival
 -- description: When messages arrived, where the trace tells. With a kernel trace: the last waking
 --     of the thread before it took the message. If it was awake when the message came, there is no
 --     row. Exact where the take is the first thing that it did then, and a thread of the middleware
@@ -23,9 +22,7 @@
 -- column: run_queue_ns BIGINT [ns]  From the waking until the thread had a CPU; NULL: not known
 -- column: executor_ns BIGINT [ns]  From there until the take; with the two before it is the latency
 WITH waking AS (
-    SELECT
-        s.thread_id, s.end_ns AS at_ns, s.waker_kind, s.waker_thread_id,
-        s.waker_other_thread_id
+    SELECT s.thread_id, s.end_ns AS at_ns, s.waker_kind, s.waker_thread_id, s.waker_other_thread_id
     FROM main.thread_state AS s
     WHERE s.state = 'sleeping'
 ),
@@ -44,8 +41,7 @@ taken AS (
     FROM main.link_transport AS l
     JOIN main.take AS t ON l.take_id = t.take_id
     JOIN main.publication AS b ON l.publication_id = b.publication_id
-    WHERE l.latency_ns IS NOT NULL
-        AND t.thread_id IN (SELECT thread_id FROM main.thread_state)
+    WHERE l.latency_ns IS NOT NULL AND t.thread_id IN (SELECT thread_id FROM main.thread_state)
 ),
 woken AS (
     SELECT k.*, w.at_ns AS arrived_ns, w.waker_kind, w.waker_thread_id, w.waker_other_thread_id
@@ -67,12 +63,7 @@ on_cpu AS (
 ),
 by_waking AS MATERIALIZED (
     SELECT
-        w.run_id,
-        w.take_id,
-        w.publication_id,
-        w.arrived_ns,
-        w.waker_kind,
-        w.waker_thread_id,
+        w.run_id, w.take_id, w.publication_id, w.arrived_ns, w.waker_kind, w.waker_thread_id,
         coalesce(x.name, o.name) AS waker_name,
         coalesce(d.at_ns < w.arrived_ns, true) AND CASE w.waker_kind
             WHEN 'thread' THEN coalesce(

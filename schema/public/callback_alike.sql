@@ -1,4 +1,3 @@
--- name: main.callback_alike
 -- description: Answers count some callbacks as one: a node may make many timers of one function
 --     and period, such as a one-shot timer for each event. Every other callback counts alone.
 -- grain: one row per callback object
@@ -7,8 +6,7 @@
 -- column: alike_id BIGINT  The first of those like it
 -- column: objects BIGINT  How many there are of them, with itself
 SELECT
-    c.callback_id,
-    c.run_id,
+    c.callback_id, c.run_id,
     min(c.callback_id) OVER alike AS alike_id,
     count(*) OVER alike AS objects
 FROM store.callback AS c

@@ -1,4 +1,3 @@
--- name: main.callback_label
 -- description: What people call a callback: what triggers it, such as Timer(5 ms) or
 --     Subscription(/scan), and the node that it belongs to. Timers of unknown period are
 --     distinguished by their handles. Functions of Python have their names.
@@ -9,8 +8,7 @@
 -- column: label VARCHAR  What triggers it
 -- column: is_internal BOOLEAN  Infrastructure of ROS
 SELECT
-    c.callback_id,
-    c.run_id,
+    c.callback_id, c.run_id,
     main.node_label(n.full_name, p.name, p.pid) AS node,
     CASE c.kind
         WHEN 'timer' THEN coalesce(

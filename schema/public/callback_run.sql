@@ -1,4 +1,3 @@
--- name: main.callback_run
 -- description: Callback instances with the names of what they belong to: those of
 --     main.callback_instance, each with its callback, node, process, host and thread.
 -- grain: one row per callback instance
@@ -16,19 +15,10 @@
 -- column: take_id BIGINT  Message it was called with
 -- column: is_internal BOOLEAN  Infrastructure of ROS
 SELECT
-    i.callback_instance_id,
-    i.run_id,
-    i.start_ns,
+    i.callback_instance_id, i.run_id, i.start_ns,
     i.end_ns - i.start_ns AS duration_ns,
-    l.node,
-    l.label AS callback,
-    p.name AS process,
-    p.pid,
-    t.tid,
-    h.hostname AS host,
-    i.callback_id,
-    i.take_id,
-    l.is_internal
+    l.node, l.label AS callback, p.name AS process, p.pid, t.tid, h.hostname AS host, i.callback_id,
+    i.take_id, l.is_internal
 FROM main.callback_instance AS i
 JOIN main.callback_label AS l ON i.callback_id = l.callback_id
 JOIN store.process AS p ON i.process_id = p.process_id

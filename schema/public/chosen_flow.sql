@@ -1,5 +1,3 @@
--- name: main.chosen_flow
--- kind: macro
 -- description: The flows that arrived, of one case, with a number each: main.end_to_end_flow of
 --     rows of main.end_to_end that are kept in a table. A flow with a stored message has no
 --     latency: it is among them only if its take is asked for.

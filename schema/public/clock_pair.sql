@@ -1,4 +1,3 @@
--- name: main.clock_pair
 -- description: What passed between hosts of two clocks, and so shows how far these are apart:
 --     messages matched by their stamps alone, requests, responses, and network packets. The
 --     shortest delays in both directions bound the error of a correction. A negative one shows that
@@ -21,9 +20,7 @@ WITH way AS (
     JOIN store.clock AS t ON w.to_clock_id = t.clock_id
 )
 SELECT
-    run_id,
-    from_clock_id,
-    to_clock_id,
+    run_id, from_clock_id, to_clock_id,
     count(CASE WHEN NOT is_packet THEN 1 END) AS message_count,
     count(CASE WHEN is_packet THEN 1 END) AS packet_count,
     min(CASE WHEN NOT is_packet THEN way_ns END) AS shortest_message_ns,

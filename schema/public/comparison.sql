@@ -1,14 +1,11 @@
--- name: main.comparison
--- kind: macro
--- description: How a run differs from another one, or from itself at another time, by path, ends
---     of paths, callback or topic: what was measured in each, and the difference with a bootstrap
---     confidence interval.
---     Values that follow each other are alike, so blocks of neighbouring values are resampled
---     (circular block bootstrap). The length of a block is estimated from the values of each run.
---     An interval needs ten blocks in either run, and five independent values beyond a quantile;
---     the maximum has no interval. The same seed gives the same interval. The interval says how
---     surely these two recordings differ. It does not say how much a system differs from itself
---     when it is started again.
+-- description: How a run differs from another one, or from itself at another time, by path, ends of
+--     paths, callback or topic: what was measured in each, and the difference with a bootstrap
+--     confidence interval. Values that follow each other are alike, so blocks of neighbouring
+--     values are resampled (circular block bootstrap). The length of a block is estimated from the
+--     values of each run. An interval needs ten blocks in either run, and five independent values
+--     beyond a quantile; the maximum has no interval. The same seed gives the same interval. The
+--     interval says how surely these two recordings differ. It does not say how much a system
+--     differs from itself when it is started again.
 -- grain: one row per thing compared and statistic; things that only one run has, too
 -- param: what VARCHAR  'paths' (end-to-end latency), 'ends' (the same between two topics, by any
 --     path), 'callbacks' (duration) or 'topics' (from publication to take)
@@ -83,8 +80,7 @@ flow AS (
         [run_a, run_b], from_topic, to_topic, 'callback_start', 'callback_end',
         (-9223372036854775808)::BIGINT, 9223372036854775807, chains := 'path_chain'
     ) AS e
-    JOIN main.flow_path([run_a, run_b], chains := 'path_chain') AS p
-        ON e.path_id = p.path_id
+    JOIN main.flow_path([run_a, run_b], chains := 'path_chain') AS p ON e.path_id = p.path_id
     WHERE what IN ('paths', 'ends')
 ),
 outcome AS (
@@ -104,11 +100,7 @@ outcome AS (
 thing AS (
     -- A root counts once, however often it arrived; not those that could not arrive, or were cut.
     SELECT
-        run_id,
-        subject,
-        false AS is_internal,
-        root_ns AS at_ns,
-        root_id AS id,
+        run_id, subject, false AS is_internal, root_ns AS at_ns, root_id AS id,
         CASE
             WHEN status <> 'reached' THEN NULL
             WHEN wanted_case = 'first' AND NOT is_first THEN NULL
@@ -118,23 +110,17 @@ thing AS (
         END AS value_ns,
         is_first IS NOT false AND status NOT IN ('not_connected', 'cut_by_recording') AS is_unit,
         status = 'reached' AS is_complete,
-        is_loss_affected,
-        is_ambiguous,
-        is_cut
+        is_loss_affected, is_ambiguous, is_cut
     FROM outcome
     UNION ALL
     SELECT
         i.run_id,
         l.node || ' · ' || l.label AS subject,
-        l.is_internal,
-        i.start_ns AS at_ns,
-        i.callback_instance_id AS id,
+        l.is_internal, i.start_ns AS at_ns, i.callback_instance_id AS id,
         i.end_ns - i.start_ns AS value_ns,
         true AS is_unit,
         i.end_ns IS NOT NULL AS is_complete,
-        i.is_loss_affected,
-        false AS is_ambiguous,
-        false AS is_cut
+        i.is_loss_affected, false AS is_ambiguous, false AS is_cut
     FROM main.callback_instance AS i
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
     WHERE what IS NOT DISTINCT FROM 'callbacks' AND list_contains([run_a, run_b], i.run_id)
@@ -144,10 +130,7 @@ thing AS (
         coalesce(s.topic_name, '?') || ' → ' || main.node_label(n.full_name, p.name, p.pid)
             AS subject,
         coalesce(s.is_internal, false) AS is_internal,
-        t.taken_ns AS at_ns,
-        t.take_id AS id,
-        l.latency_ns AS value_ns,
-        true AS is_unit,
+        t.taken_ns AS at_ns, t.take_id AS id, l.latency_ns AS value_ns, true AS is_unit,
         l.take_id IS NOT NULL AS is_complete,
         t.is_loss_affected OR coalesce(l.is_loss_affected, false) AS is_loss_affected,
         l.candidate_count > 1 AS is_ambiguous,
@@ -169,9 +152,7 @@ side AS (
     FROM (VALUES ('a', run_a, a_window), ('b', run_b, b_window)) AS s (side, run_id, time_window)
     JOIN main.run AS r ON s.run_id = r.run_id
     WHERE derive.known_word('what', what, ['paths', 'ends', 'callbacks', 'topics'])
-        AND derive.known_word(
-            'wanted_case', wanted_case, ['first', 'last', 'newest', 'every_pair']
-        )
+        AND derive.known_word('wanted_case', wanted_case, ['first', 'last', 'newest', 'every_pair'])
 ),
 sided AS MATERIALIZED (
     SELECT
@@ -183,8 +164,7 @@ sided AS MATERIALIZED (
 ),
 measured AS MATERIALIZED (
     SELECT
-        side,
-        subject,
+        side, subject,
         count(value_ns) AS number,
         quantile_disc(value_ns, [0.5, 0.95, 0.99]) AS quantiles,
         avg(value_ns) AS mean_ns,
@@ -202,14 +182,11 @@ measured AS MATERIALIZED (
 -- What each statistic varies with, about its mean: the value, or whether it lies beyond a quantile.
 centred AS MATERIALIZED (
     SELECT
-        s.side,
-        s.subject,
-        m.number,
+        s.side, s.subject, m.number,
         row_number() OVER (
             PARTITION BY s.side, s.subject ORDER BY s.at_ns, s.id, s.value_ns
         ) - 1 AS position,
-        s.at_ns,
-        s.value_ns,
+        s.at_ns, s.value_ns,
         s.value_ns - m.mean_ns AS mean_part,
         (s.value_ns > m.quantiles[1])::BIGINT AS median_part,
         (s.value_ns > m.quantiles[2])::BIGINT AS p95_part,
@@ -223,22 +200,11 @@ warm_up AS (
     FROM derive.warm_up('centred') AS w
     JOIN side AS s ON w.side = s.side
 ),
-block AS (
-    FROM derive.block_length('centred')
-),
-spread AS (
-    FROM derive.bootstrap_interval('measured', 'block', resamples, confidence, seed)
-),
+block AS (FROM derive.block_length('centred')),
+spread AS (FROM derive.bootstrap_interval('measured', 'block', resamples, confidence, seed)),
 value AS (
     SELECT
-        m.side,
-        m.subject,
-        m.number,
-        m.share,
-        m.loss_affected,
-        m.ambiguous,
-        w.warm_up_ns,
-        m.is_cut,
+        m.side, m.subject, m.number, m.share, m.loss_affected, m.ambiguous, w.warm_up_ns, m.is_cut,
         unnest(['median', 'mean', 'p95', 'p99', 'max']) AS statistic,
         unnest([0.5, NULL, 0.95, 0.99, 1.0]) AS quantile,
         unnest([
@@ -254,19 +220,12 @@ paired AS (
         coalesce(a.subject, b.subject) AS subject,
         coalesce(a.statistic, b.statistic) AS statistic,
         coalesce(a.quantile, b.quantile) AS quantile,
-        a.value_ns AS a_ns,
-        b.value_ns AS b_ns,
+        a.value_ns AS a_ns, b.value_ns AS b_ns,
         coalesce(a.number, 0) AS a_count,
         coalesce(b.number, 0) AS b_count,
-        a.independent AS a_independent,
-        b.independent AS b_independent,
-        a.share AS a_share,
-        b.share AS b_share,
-        a.loss_affected AS a_loss_affected,
-        b.loss_affected AS b_loss_affected,
-        a.ambiguous AS a_ambiguous,
-        b.ambiguous AS b_ambiguous,
-        a.warm_up_ns AS a_warm_up_ns,
+        a.independent AS a_independent, b.independent AS b_independent, a.share AS a_share,
+        b.share AS b_share, a.loss_affected AS a_loss_affected, b.loss_affected AS b_loss_affected,
+        a.ambiguous AS a_ambiguous, b.ambiguous AS b_ambiguous, a.warm_up_ns AS a_warm_up_ns,
         b.warm_up_ns AS b_warm_up_ns,
         coalesce(a.is_cut, false) OR coalesce(b.is_cut, false) AS is_cut
     FROM (SELECT * FROM value WHERE side = 'a') AS a
@@ -298,9 +257,7 @@ judged AS (
     LEFT JOIN spread AS s ON p.subject = s.subject AND p.statistic = s.statistic
 )
 SELECT
-    statistic,
-    a_ns,
-    b_ns,
+    statistic, a_ns, b_ns,
     b_ns - a_ns AS difference_ns,
     CASE WHEN a_ns > 0 THEN round(100.0 * (b_ns - a_ns) / a_ns, 3) END AS change_percent,
     CASE WHEN reason IS NULL THEN low_ns END AS low_ns,
@@ -312,19 +269,12 @@ SELECT
         WHEN low_ns > 0 THEN 'B is longer'
         ELSE 'B is shorter'
     END AS verdict,
-    a_count,
-    b_count,
+    a_count, b_count,
     floor(a_independent + 1e-9)::BIGINT AS a_independent,
     floor(b_independent + 1e-9)::BIGINT AS b_independent,
     round(a_share, 4) AS a_share,
     round(b_share, 4) AS b_share,
-    a_loss_affected,
-    b_loss_affected,
-    a_ambiguous,
-    b_ambiguous,
-    a_warm_up_ns,
-    b_warm_up_ns,
-    is_cut,
+    a_loss_affected, b_loss_affected, a_ambiguous, b_ambiguous, a_warm_up_ns, b_warm_up_ns, is_cut,
     subject
 FROM judged
 ORDER BY

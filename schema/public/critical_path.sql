@@ -1,5 +1,3 @@
--- name: main.critical_path
--- kind: macro
 -- description: What one flow had to wait for, moment by moment: its parts (main.end_to_end_part),
 --     with waits replaced by what they waited for, as far as the trace shows. Before a callback:
 --     what its executor was busy with, or what excludes the callback. In a callback: the services

@@ -1,5 +1,3 @@
--- name: main.critical_piece
--- kind: macro
 -- description: What flows had to wait for, moment by moment: the last step of main.critical_path.
 --     It replaces each wait of a flow by the parts of what the flow waited for, and the calls of
 --     services in a callback (main.waited_call) by what the service did. Where the kernel was

@@ -1,5 +1,3 @@
--- name: main.dead_end
--- kind: macro
 -- description: Subscriptions at which flows end although their node publishes: at least three
 --     messages came, and no callback of theirs led to anything, while timers, other messages or
 --     what is outside of callbacks led to publications. Either the node only consumes the messages,
@@ -163,24 +161,14 @@ loop AS (
     SELECT node_id, subscription_id FROM supposed_descent
 )
 SELECT
-    o.run_id,
-    o.node_id,
-    o.subscription_id,
-    s.topic_name,
-    o.message_count,
-    o.publisher_id,
-    p.topic_name AS output_topic,
-    o.timer_id,
-    o.trigger_id,
+    o.run_id, o.node_id, o.subscription_id, s.topic_name, o.message_count, o.publisher_id,
+    p.topic_name AS output_topic, o.timer_id, o.trigger_id,
     CASE
         WHEN o.trigger_id IS NOT NULL THEN 'from ' || coalesce(g.topic_name, '?')
         WHEN o.timer_id IS NULL THEN 'outside of callbacks'
         ELSE coalesce(printf('by a timer of %.10g ms', t.period_ns / 1e6), 'by a timer')
     END AS cause,
-    o.publication_count,
-    o.early_count,
-    o.run_ns,
-    o.publishing_run_ns,
+    o.publication_count, o.early_count, o.run_ns, o.publishing_run_ns,
     l.subscription_id IS NOT NULL AS is_loop,
     q.subscription_id IS NOT NULL AS is_queue,
     l.subscription_id IS NULL

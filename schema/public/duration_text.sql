@@ -1,5 +1,3 @@
--- name: main.duration_text
--- kind: macro
 -- description: A duration for a sentence: three digits, with the unit that fits ('83.1 ms').
 -- param: duration_ns BIGINT  The duration, in ns
 CREATE OR REPLACE MACRO main.duration_text(duration_ns) AS

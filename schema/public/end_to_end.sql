@@ -1,5 +1,3 @@
--- name: main.end_to_end
--- kind: macro
 -- description: Roots of paths in the time window, and what became of them. One that reached the
 --     sink has a row per take there, any other a single row with the reason. Roots are callback
 --     instances of timers that published, or publications (always with from_event 'publish'), or
@@ -55,9 +53,7 @@ WITH RECURSIVE chain_here AS MATERIALIZED (
     SELECT
         run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
         first_publisher_id, first_route, route, is_cached, is_path
-    FROM main.flow_chain(
-        runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
-    )
+    FROM main.flow_chain(runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths)
 ),
 chain AS NOT MATERIALIZED (
     SELECT
@@ -83,16 +79,11 @@ path AS MATERIALIZED (
     WHERE path_id IN (SELECT prefix_id FROM lineage)
 ),
 -- What recursion looks up stays in memory: one number stands for all that a step has to fit.
-way AS MATERIALIZED (
-    SELECT DISTINCT way_id, publisher_id, subscription_id, route FROM path
-),
+way AS MATERIALIZED (SELECT DISTINCT way_id, publisher_id, subscription_id, route FROM path),
 -- root_key: positive for a callback instance, negative for a publication and, odd, for a take.
 root AS MATERIALIZED (
     SELECT
-        r.run_id,
-        r.publication_id,
-        r.publisher_id,
-        r.route,
+        r.run_id, r.publication_id, r.publisher_id, r.route,
         CASE
             WHEN r.root_kind = 'take' THEN 2 * r.publication_id - 1
             WHEN i.callback_instance_id IS NULL THEN -2 * r.publication_id
@@ -113,9 +104,7 @@ root AS MATERIALIZED (
         AND coalesce(root_ns >= window_start_ns, true)
         AND coalesce(root_ns < window_end_ns, true)
 ),
-stored AS MATERIALIZED (
-    SELECT take_id FROM derive.stored_take WHERE list_contains(runs, run_id)
-),
+stored AS MATERIALIZED (SELECT take_id FROM derive.stored_take WHERE list_contains(runs, run_id)),
 transport AS NOT MATERIALIZED (
     SELECT
         publication_id, publisher_id, take_id, subscription_id, is_ambiguous,
@@ -204,18 +193,13 @@ missing AS MATERIALIZED (
 ),
 -- All flows go through here: what is said of a path or of a missing arrival is added at the end.
 outcome AS MATERIALIZED (
-    SELECT
-        a.path_id, a.root_key, e.root_ns, a.take_id, a.sink_ns, a.is_stored, a.is_ambiguous
+    SELECT a.path_id, a.root_key, e.root_ns, a.take_id, a.sink_ns, a.is_stored, a.is_ambiguous
     FROM pair AS a
     JOIN expected AS e ON a.path_id = e.path_id AND a.root_key = e.root_key
     UNION ALL
     SELECT path_id, root_key, root_ns, NULL, NULL, false, false FROM missing
 ),
-longest AS (
-    SELECT path_id, max(sink_ns - root_ns) AS longest_ns
-    FROM outcome
-    GROUP BY path_id
-),
+longest AS (SELECT path_id, max(sink_ns - root_ns) AS longest_ns FROM outcome GROUP BY path_id),
 -- With time enough for the longest flow it is not the recording that cut a root.
 explained AS (
     SELECT
@@ -250,16 +234,14 @@ ranked AS (
     WINDOW of_root AS (PARTITION BY o.path_id, o.root_key ORDER BY o.sink_ns, o.take_id)
 )
 SELECT
-    r.run_id,
-    r.path_id,
+    r.run_id, r.path_id,
     CASE
         WHEN r.root_key > 0 THEN 'callback_instance'
         WHEN r.root_key % 2 = 0 THEN 'publication'
         ELSE 'take'
     END AS root_kind,
     CASE WHEN r.root_key > 0 THEN r.root_key ELSE -r.root_key // 2 END AS root_id,
-    r.root_ns,
-    r.take_id,
+    r.root_ns, r.take_id,
     CASE WHEN r.take_id IS NOT NULL THEN k.sink_event END AS sink_event,
     r.sink_ns,
     CASE WHEN NOT r.is_stored THEN r.sink_ns - r.root_ns END AS latency_ns,

@@ -1,5 +1,3 @@
--- name: main.end_to_end_between
--- kind: macro
 -- description: Flows between two topics, whatever path they took: rows of main.end_to_end of
 --     several paths become rows of one. A root that arrived by any path has arrived, once for each
 --     message that reflects it. Another has the status that says most: 'cut_by_recording', then
@@ -27,9 +25,7 @@
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time
 -- column: is_ambiguous BOOLEAN  All its paths pass a link that may be another one
 CREATE OR REPLACE MACRO main.end_to_end_between(arrivals) AS TABLE
-WITH flow AS (
-    SELECT *, string_split(path, ' → ')[-1] AS node FROM query_table(arrivals)
-),
+WITH flow AS (SELECT *, string_split(path, ' → ')[-1] AS node FROM query_table(arrivals)),
 united AS (
     SELECT
         run_id, first_topic, last_topic, node, root_kind, root_id, take_id,

@@ -1,5 +1,3 @@
--- name: main.end_to_end_flow
--- kind: macro
 -- description: The flows that arrived (main.end_to_end), of one case, with a number each. The
 --     first of three steps of main.end_to_end_part, which need less memory one by one: keep its
 --     rows as a table, then those of main.end_to_end_trail, and ask main.end_to_end_piece.

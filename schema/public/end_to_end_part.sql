@@ -1,5 +1,3 @@
--- name: main.end_to_end_part
--- kind: macro
 -- description: What the latency of each flow of each path (main.end_to_end) consists of: parts that
 --     follow each other and add up to it. A part is negative if the next one began before it ended:
 --     clocks of two hosts are apart, a message was taken before the publishing call returned, or a
@@ -16,16 +14,14 @@
 -- column: position BIGINT  Order within the flow, from 1
 -- column: part VARCHAR  'callback' (from its start, or from the take where none shows, to what it
 --     publishes or calls), 'cache' (from the end of the callback to the callback instance that
---     publishes for it),
---     'intra', 'rclcpp', 'rcl', 'rmw', 'dds' (publishing, from this layer to the next), 'publish'
---     (publishing, layer not known), 'stored' (from the last layer until the subscription existed,
---     of a message that was published before), 'publish_to_take' (from there, or from the last
---     layer, to the take: writing
---     the message, the network, an idle executor or a busy one, see main.executor_wait),
---     'take_to_callback', 'request_to_take' (from the sending of a request), 'service' (from the
---     start of the service callback to what it publishes or calls, or to the sending of the
---     response), 'response_to_take' (from there on; what the client does then is a 'callback'
---     again, from the take on)
+--     publishes for it), 'intra', 'rclcpp', 'rcl', 'rmw', 'dds' (publishing, from this layer to the
+--     next), 'publish' (publishing, layer not known), 'stored' (from the last layer until the
+--     subscription existed, of a message that was published before), 'publish_to_take' (from there,
+--     or from the last layer, to the take: writing the message, the network, an idle executor or a
+--     busy one, see main.executor_wait), 'take_to_callback', 'request_to_take' (from the sending of
+--     a request), 'service' (from the start of the service callback to what it publishes or calls,
+--     or to the sending of the response), 'response_to_take' (from there on; what the client does
+--     then is a 'callback' again, from the take on)
 -- column: from_ns BIGINT [epoch ns]  Begin
 -- column: to_ns BIGINT [epoch ns]  End
 -- column: duration_ns BIGINT [ns]  to_ns - from_ns

@@ -1,5 +1,3 @@
--- name: main.end_to_end_piece
--- kind: macro
 -- description: The parts of flows: the last step of main.end_to_end_part.
 -- grain: one row per flow and part
 -- like: main.end_to_end_part

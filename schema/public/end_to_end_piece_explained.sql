@@ -1,5 +1,3 @@
--- name: main.end_to_end_piece_explained
--- kind: macro
 -- description: The parts of flows (main.end_to_end_piece), with the callback of each, and how long
 --     the executor was busy with other callbacks while the message waited. A parameter gives the
 --     callback instances, so that they need not be looked up for each part.

@@ -1,5 +1,3 @@
--- name: main.end_to_end_trail
--- kind: macro
 -- description: The messages on the way of each flow (main.end_to_end_flow), from its root to its
 --     end. Of several ways it is that whose list of publications, then of takes, comes first.
 -- grain: one row per flow and message on its way
@@ -23,9 +21,7 @@ WITH RECURSIVE flow AS NOT MATERIALIZED (
 ),
 chain_here AS MATERIALIZED (
     SELECT path_id, parent_path_id, depth, publisher_id, subscription_id, route
-    FROM main.flow_chain(
-        runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
-    )
+    FROM main.flow_chain(runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths)
 ),
 chain AS NOT MATERIALIZED (FROM query_table(chains)),
 -- Before each message of a path but the first: the message that led to it, and how.
@@ -37,9 +33,7 @@ link AS MATERIALIZED (
     FROM chain AS c
     JOIN chain AS p ON c.parent_path_id = p.path_id
 ),
-way AS MATERIALIZED (
-    SELECT DISTINCT way_id, route, publisher_id, subscription_id FROM link
-),
+way AS MATERIALIZED (SELECT DISTINCT way_id, route, publisher_id, subscription_id FROM link),
 -- What led to each publication, by way of a callback of the node or of a service that it called.
 continuation AS NOT MATERIALIZED (
     SELECT publication_id, take_id, subscription_id, []::BIGINT[] AS route
@@ -74,21 +68,14 @@ trail (
     WHERE list_contains(runs, t.run_id)
     UNION ALL
     SELECT
-        flow_id,
-        path_id,
-        hop,
-        take_id,
-        publication_id,
-        way.next_take_id,
+        flow_id, path_id, hop, take_id, publication_id, way.next_take_id,
         dense_rank() OVER (ORDER BY flow_id, publication_id, way.publications_rank),
         dense_rank() OVER (ORDER BY flow_id, take_id, way.takes_rank)
     FROM (
         SELECT
-            r.flow_id,
-            l.parent_path_id AS path_id,
+            r.flow_id, l.parent_path_id AS path_id,
             r.hop - 1 AS hop,
-            s.take_id,
-            s.publication_id,
+            s.take_id, s.publication_id,
             min(struct_pack(
                 publications_rank := r.publications_rank,
                 takes_rank := r.takes_rank,
@@ -120,8 +107,6 @@ hop (flow_id, hop, take_id, publication_id, previous_take_id, next_take_id) AS (
     UNION ALL
     SELECT h.flow_id, r.hop, r.take_id, r.publication_id, h.take_id, r.next_take_id
     FROM hop AS h
-    JOIN trail AS r
-        ON h.flow_id = r.flow_id AND h.hop + 1 = r.hop AND h.next_take_id = r.take_id
+    JOIN trail AS r ON h.flow_id = r.flow_id AND h.hop + 1 = r.hop AND h.next_take_id = r.take_id
 )
-SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
-FROM hop
+SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id FROM hop

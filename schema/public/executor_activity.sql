@@ -1,4 +1,3 @@
--- name: main.executor_activity
 -- description: What executor threads did: each state, divided where a callback begins or ends, and
 --     where the thread takes a message. A thread of a multi-threaded executor is blocked after its
 --     callback, and after it looked in vain, until it may look for work again. Of nested callbacks

@@ -1,5 +1,3 @@
--- name: main.executor_activity_within
--- kind: macro
 -- description: The rows of main.executor_activity that reach into a time window, far sooner than
 --     selected from all. What began before, and has no end since a gap follows, is among them only
 --     if the gap ends in the window or later.
@@ -12,10 +10,7 @@
 CREATE OR REPLACE MACRO main.executor_activity_within(runs, window_start_ns, window_end_ns) AS TABLE
 WITH activity AS (
     SELECT
-        a.run_id,
-        a.executor_id,
-        a.thread_id,
-        a.activity,
+        a.run_id, a.executor_id, a.thread_id, a.activity,
         derive.corrected_ns(a.start_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS start_ns,
         derive.corrected_ns(a.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS end_ns,
         a.callback_instance_id

@@ -1,4 +1,3 @@
--- name: main.executor_interference
 -- description: What the threads of its executor ran while a callback instance waited. Overlaps on
 --     one thread add up to the time for which it was busy; overlaps on several threads may lie side
 --     by side in time.
@@ -12,9 +11,7 @@
 -- column: overlap_ns BIGINT [ns]  Overlap from earliest_ns of the wait on (from latest_ns if that
 --     is unknown)
 -- column: certain_ns BIGINT [ns]  Overlap from latest_ns of the wait on
-WITH executor AS (
-    SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size
-),
+WITH executor AS (SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size),
 ready AS (
     SELECT run_id, executor_id, callback_instance_id, earliest_ns, latest_ns, start_ns
     FROM derive.callback_ready('executor')

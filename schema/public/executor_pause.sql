@@ -1,5 +1,3 @@
--- name: main.executor_pause
--- kind: macro
 -- description: What threads of events executors did between callbacks in a time window, as far as
 --     that is known: these rows of main.executor_activity, far sooner.
 -- grain: one row per interval of such a thread outside of callbacks and takes
@@ -14,9 +12,7 @@
 CREATE OR REPLACE MACRO main.executor_pause(runs, window_start_ns, window_end_ns) AS TABLE
 WITH pause AS (
     SELECT
-        q.run_id,
-        q.thread_id,
-        q.activity,
+        q.run_id, q.thread_id, q.activity,
         derive.corrected_ns(q.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
         derive.corrected_ns(q.end_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS end_ns
     FROM derive.queue_activity(runs, window_start_ns, window_end_ns) AS q

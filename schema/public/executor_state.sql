@@ -1,4 +1,3 @@
--- name: main.executor_state
 -- description: What executor threads did, as their three events say.
 -- grain: one row per interval between two executor events of a thread
 -- column: run_id
@@ -10,10 +9,7 @@
 --     a gap follows, or the recording leaves out events that end states)
 -- column: callback_instance_id
 SELECT
-    s.run_id,
-    s.executor_id,
-    s.thread_id,
-    s.state,
+    s.run_id, s.executor_id, s.thread_id, s.state,
     derive.corrected_ns(s.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
     derive.corrected_ns(s.end_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS end_ns,
     s.callback_instance_id

@@ -1,4 +1,3 @@
--- name: main.executor_wait
 -- description: How long callback instances waited in their executor, and what for. A trace does not
 --     say when an input arrived: it became ready between earliest_ns and latest_ns. It could not
 --     start (the executor was busy) while all threads ran callbacks, or one ran that excludes it.
@@ -30,9 +29,7 @@
 --     or the thread that ran this callback had picked it, and did not start it yet. Not part of
 --     busy_max_ns. Of an executor of one thread: the time between two waits for which it ran no
 --     callback, if that is a millisecond or more. NULL: not known, or less
-WITH executor AS (
-    SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size
-),
+WITH executor AS (SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size),
 ready AS (
     SELECT
         run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,

@@ -1,5 +1,3 @@
--- name: main.executor_wait_explained
--- kind: macro
 -- description: How long callback instances waited in their executor (main.executor_wait), and which
 --     callbacks its threads ran meanwhile (main.executor_interference, summed up by callback). Both
 --     at once take hardly longer than one of them. Where a kernel trace or CARET shows exactly

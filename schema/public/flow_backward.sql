@@ -1,5 +1,3 @@
--- name: main.flow_backward
--- kind: macro
 -- description: Everything that caused a publication, take, callback instance, request or response,
 --     directly or through other things, and the thing itself.
 -- grain: one row per vertex

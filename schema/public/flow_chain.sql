@@ -1,5 +1,3 @@
--- name: main.flow_chain
--- kind: macro
 -- description: The chains of main.flow_path, each as its last step and a pointer to the chain
 --     without it: the cost of lists of what lies on them would grow with the square of their
 --     length. No subscription comes twice in a chain. What asks several of main.flow_path,
@@ -48,9 +46,7 @@ hop AS MATERIALIZED (
 ),
 -- Only what leads to the end asked for is followed: nothing else needs to be enumerated.
 toward_end (subscription_id) AS (
-    SELECT subscription_id
-    FROM hop
-    WHERE to_topic IS NULL OR is_last
+    SELECT subscription_id FROM hop WHERE to_topic IS NULL OR is_last
     UNION
     SELECT h.from_subscription_id
     FROM toward_end AS l
@@ -85,10 +81,7 @@ chain AS (
         row_number() OVER (ORDER BY run_id, publisher_id, subscription_id, route)
         - rank() OVER (ORDER BY run_id) + 1 AS number,
         NULL::BIGINT AS parent_number,
-        hop_id AS first_hop_id,
-        hop_id,
-        subscription_id,
-        is_last,
+        hop_id AS first_hop_id, hop_id, subscription_id, is_last,
         set_bit(nowhere, place, 1) AS visited,
         NULL::BIGINT AS parent_publishers_rank,
         dense_rank() OVER (ORDER BY run_id, publisher_id) AS publishers_rank,
@@ -100,30 +93,16 @@ chain AS (
     QUALIFY number <= max_paths
     UNION ALL
     SELECT
-        run_id,
-        depth,
+        run_id, depth,
         row_number() OVER (ORDER BY run_id, publishers_rank, subscriptions_rank, routes_rank)
         - rank() OVER (ORDER BY run_id) + 1 AS number,
-        parent_number,
-        first_hop_id,
-        hop_id,
-        subscription_id,
-        is_last,
-        visited,
-        parent_publishers_rank,
-        publishers_rank,
-        subscriptions_rank,
-        routes_rank,
-        is_crowded
+        parent_number, first_hop_id, hop_id, subscription_id, is_last, visited,
+        parent_publishers_rank, publishers_rank, subscriptions_rank, routes_rank, is_crowded
     FROM (
         SELECT
             c.run_id,
             c.depth + 1 AS depth,
-            c.number AS parent_number,
-            c.first_hop_id,
-            u.hop_id,
-            u.subscription_id,
-            u.is_last,
+            c.number AS parent_number, c.first_hop_id, u.hop_id, u.subscription_id, u.is_last,
             set_bit(c.visited, u.place, 1) AS visited,
             c.publishers_rank AS parent_publishers_rank,
             dense_rank() OVER (
@@ -136,9 +115,7 @@ chain AS (
             c.is_crowded OR count(*) OVER (PARTITION BY c.run_id) > max_paths AS is_crowded
         FROM chain AS c
         JOIN useful AS u ON c.subscription_id = u.from_subscription_id
-        WHERE c.depth < max_depth
-            AND NOT c.is_last
-            AND get_bit(c.visited, u.place) = 0
+        WHERE c.depth < max_depth AND NOT c.is_last AND get_bit(c.visited, u.place) = 0
     )
     QUALIFY number <= max_paths
 ),
@@ -150,14 +127,11 @@ list AS MATERIALIZED (
     SELECT
         row_number() OVER (ORDER BY run_id, depth, publishers_rank) AS list_id,
         run_id, depth, publishers_rank, parent_publishers_rank
-    FROM (
-        SELECT DISTINCT run_id, depth, publishers_rank, parent_publishers_rank FROM chain
-    )
+    FROM (SELECT DISTINCT run_id, depth, publishers_rank, parent_publishers_rank FROM chain)
 ),
 around AS (
     SELECT
-        l.list_id,
-        p.list_id AS parent_id,
+        l.list_id, p.list_id AS parent_id,
         lead(l.list_id) OVER (
             PARTITION BY l.run_id, l.depth, l.parent_publishers_rank ORDER BY l.list_id
         ) AS next_id
@@ -174,8 +148,7 @@ walk (point, next_point, entered) USING KEY (point) AS (
         SELECT parent_id, min(list_id) AS child_id FROM around GROUP BY parent_id
     ) AS c ON a.list_id = c.parent_id
     UNION ALL
-    SELECT 2 * list_id + 1, coalesce(2 * next_id, 2 * parent_id + 1), 0
-    FROM around
+    SELECT 2 * list_id + 1, coalesce(2 * next_id, 2 * parent_id + 1), 0 FROM around
     UNION
     SELECT w.point, n.next_point, w.entered + n.entered
     FROM walk AS w
@@ -214,28 +187,17 @@ limited AS (
     LEFT JOIN numbered AS p
         ON n.run_id = p.run_id AND n.depth - 1 = p.depth AND n.parent_number = p.number
     LEFT JOIN ended AS e ON n.run_id = e.run_id AND n.depth = e.depth AND n.number = e.number
-    LEFT JOIN continuable AS c
-        ON n.run_id = c.run_id AND n.depth = c.depth AND n.number = c.number
+    LEFT JOIN continuable AS c ON n.run_id = c.run_id AND n.depth = c.depth AND n.number = c.number
 ),
 ranked AS (
     SELECT
         run_id, path_id, parent_path_id, depth, first_hop_id, hop_id, is_candidate, is_cut,
-        row_number() OVER (
-            PARTITION BY run_id, is_candidate ORDER BY depth, path_id
-        ) AS path_number
+        row_number() OVER (PARTITION BY run_id, is_candidate ORDER BY depth, path_id) AS path_number
     FROM limited
 )
 SELECT
-    r.run_id,
-    r.path_id,
-    r.parent_path_id,
-    r.depth,
-    u.publisher_id,
-    u.subscription_id,
-    u.route,
-    f.publisher_id AS first_publisher_id,
-    f.route AS first_route,
-    u.is_cached,
+    r.run_id, r.path_id, r.parent_path_id, r.depth, u.publisher_id, u.subscription_id, u.route,
+    f.publisher_id AS first_publisher_id, f.route AS first_route, u.is_cached,
     r.is_candidate AND r.path_number <= max_paths AS is_path,
     CASE
         WHEN bool_or(r.is_candidate AND r.path_number > max_paths) OVER run THEN true

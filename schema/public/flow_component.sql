@@ -1,5 +1,3 @@
--- name: main.flow_component
--- kind: macro
 -- description: Everything that is connected with a publication, take, callback instance, request or
 --     response in any direction, and the thing itself.
 -- grain: one row per vertex

@@ -1,4 +1,3 @@
--- name: main.flow_edge
 -- description: All links in one shape, with the times of both ends: cause and effect of every step
 --     that a message takes.
 -- grain: one row per cause, effect and kind of link, however many annotations declare it
@@ -21,8 +20,7 @@ SELECT
     'take' AS to_kind,
     l.take_id AS to_id,
     'transport' AS link_kind,
-    b.end_ns AS from_ns,
-    t.taken_ns AS to_ns
+    b.end_ns AS from_ns, t.taken_ns AS to_ns
 FROM main.link_transport AS l
 JOIN main.publication AS b ON l.publication_id = b.publication_id
 JOIN main.take AS t ON l.take_id = t.take_id
@@ -35,8 +33,7 @@ SELECT
     'callback_instance',
     i.callback_instance_id,
     'callback',
-    t.taken_ns,
-    i.start_ns
+    t.taken_ns, i.start_ns
 FROM main.callback_instance AS i
 JOIN main.take AS t ON i.take_id = t.take_id
 UNION ALL
@@ -45,15 +42,12 @@ SELECT
     CASE WHEN l.callback_instance_id IS NULL THEN 'take' ELSE 'callback_instance' END,
     coalesce(l.callback_instance_id, l.take_id),
     'publication',
-    l.publication_id,
-    l.kind,
+    l.publication_id, l.kind,
     coalesce(i.start_ns, t.taken_ns),
     b.start_ns
 FROM derive.flow_cause AS l
-LEFT JOIN main.callback_instance AS i
-    ON l.callback_instance_id = i.callback_instance_id
-LEFT JOIN main.take AS t
-    ON l.callback_instance_id IS NULL AND l.take_id = t.take_id
+LEFT JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
+LEFT JOIN main.take AS t ON l.callback_instance_id IS NULL AND l.take_id = t.take_id
 JOIN main.publication AS b ON l.publication_id = b.publication_id
 UNION ALL
 SELECT
@@ -63,8 +57,7 @@ SELECT
     'request',
     l.request_id,
     'direct',
-    i.start_ns,
-    q.sent_ns
+    i.start_ns, q.sent_ns
 FROM derive.certain_request AS l
 JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
 JOIN main.request AS q ON l.request_id = q.request_id
@@ -76,8 +69,7 @@ SELECT
     'callback_instance',
     i.callback_instance_id,
     'callback',
-    q.taken_ns,
-    i.start_ns
+    q.taken_ns, i.start_ns
 FROM main.callback_instance AS i
 JOIN main.request AS q ON i.request_id = q.request_id
 UNION ALL
@@ -108,11 +100,7 @@ JOIN main.request AS q ON r.request_id = q.request_id
 WHERE r.callback_instance_id IS NULL
 UNION ALL
 SELECT
-    l.run_id,
-    l.from_kind,
-    l.from_id,
-    l.to_kind,
-    l.to_id,
+    l.run_id, l.from_kind, l.from_id, l.to_kind, l.to_id,
     'take_adjacent',
     coalesce(tq.taken_ns, tr.taken_ns),
     coalesce(b.start_ns, q.sent_ns, r.sent_ns)

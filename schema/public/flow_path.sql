@@ -1,5 +1,3 @@
--- name: main.flow_path
--- kind: macro
 -- description: Chains of publishers and subscriptions that flows can take, with all their
 --     beginnings. No subscription comes twice in a chain. Where a service led to a publication, the
 --     chain has the node that called and the services in between. A publisher that is not traced is
@@ -28,15 +26,12 @@ WITH RECURSIVE chain_here AS MATERIALIZED (
     SELECT
         run_id, path_id, parent_path_id, depth, publisher_id, subscription_id, route, is_cached,
         is_path, is_cut
-    FROM main.flow_chain(
-        runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
-    )
+    FROM main.flow_chain(runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths)
 ),
 chain AS NOT MATERIALIZED (FROM query_table(chains)),
 called AS (
     SELECT
-        r.route,
-        r.position,
+        r.route, r.position,
         printf(
             '(%s) → %s',
             coalesce(s.service_name, '?'),
@@ -45,8 +40,7 @@ called AS (
         ) AS label,
         s.node_id
     FROM (
-        SELECT
-            route, unnest(route[2:]) AS service_id, unnest(range(2, len(route) + 1)) AS position
+        SELECT route, unnest(route[2:]) AS service_id, unnest(range(2, len(route) + 1)) AS position
         FROM (SELECT DISTINCT route FROM chain)
     ) AS r
     LEFT JOIN store.service AS s ON r.service_id = s.service_id
@@ -112,19 +106,7 @@ whole AS (
     GROUP BY l.path_id
 )
 SELECT
-    c.run_id,
-    c.path_id,
-    c.parent_path_id,
-    c.depth,
-    w.publishers,
-    w.subscriptions,
-    w.topics,
-    w.routes,
-    w.path,
-    c.publisher_id,
-    c.subscription_id,
-    c.is_cached,
-    c.is_path,
-    c.is_cut
+    c.run_id, c.path_id, c.parent_path_id, c.depth, w.publishers, w.subscriptions, w.topics,
+    w.routes, w.path, c.publisher_id, c.subscription_id, c.is_cached, c.is_path, c.is_cut
 FROM chain AS c
 JOIN whole AS w ON c.path_id = w.path_id

@@ -1,5 +1,3 @@
--- name: main.flow_step
--- kind: macro
 -- description: The picture of one message: what a publication, take, callback instance, request or
 --     response caused, what it was caused by, or both, with times, names, and what is missing. If a
 --     limit cuts the flow, the vertices nearest to the start are kept.
@@ -49,17 +47,14 @@ WITH RECURSIVE origin AS MATERIALIZED (
     SELECT run_id FROM store.publication
     WHERE start_kind = 'publication' AND publication_id = start_id
     UNION ALL
-    SELECT run_id FROM store.take
-    WHERE start_kind = 'take' AND take_id = start_id
+    SELECT run_id FROM store.take WHERE start_kind = 'take' AND take_id = start_id
     UNION ALL
     SELECT run_id FROM store.callback_instance
     WHERE start_kind = 'callback_instance' AND callback_instance_id = start_id
     UNION ALL
-    SELECT run_id FROM store.request
-    WHERE start_kind = 'request' AND request_id = start_id
+    SELECT run_id FROM store.request WHERE start_kind = 'request' AND request_id = start_id
     UNION ALL
-    SELECT run_id FROM store.response
-    WHERE start_kind = 'response' AND response_id = start_id
+    SELECT run_id FROM store.response WHERE start_kind = 'response' AND response_id = start_id
 ),
 -- Effects on ROS's own topics and services: no branches of the picture.
 aside AS MATERIALIZED (
@@ -101,9 +96,7 @@ edge AS MATERIALIZED (
     ANTI JOIN aside AS a ON l.to_key = a.key
     WHERE direction <> 'backward'
     UNION ALL
-    SELECT true, to_key, from_key
-    FROM link
-    WHERE direction <> 'forward'
+    SELECT true, to_key, from_key FROM link WHERE direction <> 'forward'
 ),
 near (is_backward, key, depth) USING KEY (is_backward, key) AS (
     SELECT s.is_backward, derive.vertex_key(start_kind, start_id)::BIGINT, 0
@@ -150,9 +143,7 @@ left_out AS (
     WHERE NOT s.is_backward
     GROUP BY s.key
 ),
-described AS MATERIALIZED (
-    FROM main.flow_vertex('vertex')
-),
+described AS MATERIALIZED (FROM main.flow_vertex('vertex')),
 arrow AS MATERIALIZED (
     SELECT
         l.from_kind, l.from_id, l.link_kind, l.to_id,
@@ -163,11 +154,7 @@ arrow AS MATERIALIZED (
     JOIN vertex AS t ON l.to_kind = t.kind AND l.to_id = t.id
 )
 SELECT
-    d.run_id,
-    d.depth,
-    a.from_kind,
-    a.from_id,
-    a.link_kind,
+    d.run_id, d.depth, a.from_kind, a.from_id, a.link_kind,
     CASE
         WHEN a.link_kind IN ('transport', 'callback', 'take_adjacent', 'polled')
             OR derive.is_indirect(a.link_kind)
@@ -175,24 +162,14 @@ SELECT
         WHEN a.link_kind = 'service' AND d.start_ns >= f.end_ns THEN d.start_ns - f.end_ns
     END AS wait_ns,
     coalesce(
-        lt.candidate_count,
-        lc.candidate_count,
+        lt.candidate_count, lc.candidate_count,
         -- What follows from a request or response is followed only if it is certain.
         CASE WHEN a.link_kind = 'take_adjacent' THEN 1 END
     ) AS candidate_count,
     coalesce(lt.is_loss_affected, lc.is_loss_affected) AS is_loss_affected,
-    d.kind,
-    d.id,
-    d.start_ns,
-    d.end_ns,
-    d.node,
-    d.label,
-    d.topic_name,
-    d.symbol,
+    d.kind, d.id, d.start_ns, d.end_ns, d.node, d.label, d.topic_name, d.symbol,
     printf('%s %d', coalesce(h.name, '?'), h.tid) AS thread,
-    m.hostname AS host,
-    d.missing,
-    d.reason,
+    m.hostname AS host, d.missing, d.reason,
     coalesce(c.cut_count, 0) AS cut_count,
     coalesce(o.internal_count, 0) AS internal_count
 FROM described AS d
@@ -215,26 +192,16 @@ UNION ALL
 SELECT
     x.run_id,
     d.depth + 1,
-    d.kind,
-    d.id,
+    d.kind, d.id,
     derive.delivery_status(x.reason),
-    NULL,
-    NULL,
-    NULL,
+    NULL, NULL, NULL,
     'subscription',
-    x.subscription_id,
-    NULL,
-    NULL,
+    x.subscription_id, NULL, NULL,
     main.node_label(n.full_name, o.name, o.pid),
     coalesce(s.topic_name, '?'),
-    s.topic_name,
-    NULL,
-    NULL,
-    m.hostname,
+    s.topic_name, NULL, NULL, m.hostname,
     'take',
-    x.reason,
-    0,
-    0
+    x.reason, 0, 0
 FROM shown AS v
 JOIN described AS d ON v.key = d.key
 JOIN derive.flow_end AS x ON x.kind = 'publication' AND v.id = x.id

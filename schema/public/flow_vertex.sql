@@ -1,5 +1,3 @@
--- name: main.flow_vertex
--- kind: macro
 -- description: What vertices of the graph of flows are: when and where each was, what it is called,
 --     and what the trace does not show of it.
 -- grain: one row per vertex
@@ -19,8 +17,7 @@
 -- column: reason VARCHAR  Why it is missing, as far as known
 CREATE OR REPLACE MACRO main.flow_vertex(vertices) AS TABLE
 SELECT
-    v.key, v.kind, v.id, v.depth, b.run_id, b.start_ns, b.end_ns, b.thread_id,
-    b.process_id,
+    v.key, v.kind, v.id, v.depth, b.run_id, b.start_ns, b.end_ns, b.thread_id, b.process_id,
     main.node_label(n.full_name, o.name, o.pid) AS node,
     coalesce(p.topic_name, '?') AS label,
     p.topic_name,
@@ -35,12 +32,10 @@ LEFT JOIN store.node AS n ON p.node_id = n.node_id
 WHERE v.kind = 'publication'
 UNION ALL
 SELECT
-    v.key, v.kind, v.id, v.depth, t.run_id, t.taken_ns, t.taken_ns, t.thread_id,
-    t.process_id,
+    v.key, v.kind, v.id, v.depth, t.run_id, t.taken_ns, t.taken_ns, t.thread_id, t.process_id,
     main.node_label(n.full_name, o.name, o.pid),
     coalesce(s.topic_name, '?'),
-    s.topic_name,
-    NULL,
+    s.topic_name, NULL,
     CASE
         WHEN x.id IS NOT NULL THEN 'publication'
         WHEN i.take_id IS NULL AND y.take_id IS NULL AND z.take_id IS NOT NULL THEN 'copy'
@@ -86,11 +81,9 @@ UNION ALL
 SELECT
     v.key, v.kind, v.id, v.depth, q.run_id, coalesce(q.sent_ns, q.taken_ns), q.taken_ns,
     q.thread_id, h.process_id,
-    CASE WHEN c.client_id IS NULL THEN '?'
-        ELSE main.node_label(n.full_name, o.name, o.pid) END,
+    CASE WHEN c.client_id IS NULL THEN '?' ELSE main.node_label(n.full_name, o.name, o.pid) END,
     coalesce(c.service_name, s.service_name, '?'),
-    NULL,
-    NULL,
+    NULL, NULL,
     CASE
         WHEN q.sent_ns IS NULL THEN 'sending'
         WHEN q.taken_ns IS NULL THEN 'take'

@@ -1,5 +1,3 @@
--- name: main.function_time
--- kind: macro
 -- description: How often functions ran, and were called by what ran, in samples of stacks.
 -- grain: one row per group and function that a sample of the group saw
 -- param: of_samples VARCHAR  Name of the samples, with columns group_id, stack_id and cpu_ns: a
@@ -24,12 +22,9 @@ within AS (
     FROM main.stack_call
     WHERE stack_id IN (SELECT stack_id FROM seen)
 ),
-whole AS (
-    SELECT group_id, sum(samples) AS samples FROM seen GROUP BY group_id
-)
+whole AS (SELECT group_id, sum(samples) AS samples FROM seen GROUP BY group_id)
 SELECT
-    s.group_id,
-    w.stack_frame_id,
+    s.group_id, w.stack_frame_id,
     coalesce(sum(s.samples) FILTER (WHERE is_self), 0)::BIGINT AS self_samples,
     sum(s.samples)::BIGINT AS samples,
     sum(CASE WHEN is_self THEN s.cpu_ns WHEN s.cpu_ns IS NOT NULL THEN 0 END)::BIGINT AS self_ns,

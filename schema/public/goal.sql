@@ -1,4 +1,3 @@
--- name: main.goal
 -- description: Goals of actions, from sending to result, as far as services and topics of the
 --     action show it (Kilted and later). The identity of a goal is not in the trace, and neither is
 --     how it ended. So a result is known to be of a goal if the client asked for it in the callback
@@ -74,13 +73,10 @@ result AS (
     WHERE p.candidate_count = 1
 ),
 possible AS (
-    SELECT goal_id, any_value(candidate_count) AS candidate_count
-    FROM paired
-    GROUP BY goal_id
+    SELECT goal_id, any_value(candidate_count) AS candidate_count FROM paired GROUP BY goal_id
 ),
 told AS (
-    SELECT
-        f.goal_id, count(*) AS number, min(b.start_ns) AS first_ns, max(b.start_ns) AS last_ns
+    SELECT f.goal_id, count(*) AS number, min(b.start_ns) AS first_ns, max(b.start_ns) AS last_ns
     FROM derive.goal_feedback('server', 'alone') AS f
     JOIN main.publication AS b ON f.publication_id = b.publication_id
     GROUP BY f.goal_id
@@ -152,11 +148,10 @@ torn AS (
         )
 )
 SELECT
-    run_id, goal_id, action_name, action_client_id, action_server_id,
-    sent_ns, taken_ns, answered_ns, answer_taken_ns, is_accepted,
-    result_asked_ns, result_sent_ns, result_taken_ns, result_request_id, result_candidate_count,
-    feedback_count, first_feedback_ns, last_feedback_ns, is_overlapping,
-    cancel_asked_ns, cancel_accepted_ns,
+    run_id, goal_id, action_name, action_client_id, action_server_id, sent_ns, taken_ns,
+    answered_ns, answer_taken_ns, is_accepted, result_asked_ns, result_sent_ns, result_taken_ns,
+    result_request_id, result_candidate_count, feedback_count, first_feedback_ns, last_feedback_ns,
+    is_overlapping, cancel_asked_ns, cancel_accepted_ns,
     answer_taken_ns - sent_ns AS accept_latency_ns,
     result_sent_ns - answered_ns AS execution_ns,
     first_feedback_ns - answered_ns AS first_feedback_latency_ns,

@@ -1,4 +1,3 @@
--- name: main.link_packet
 -- description: Network packets that kernel traces recorded at both ends, between hosts of two
 --     clocks. A negative latency means that the clocks are apart.
 -- grain: one row per network packet and clock that received it from another
@@ -31,17 +30,8 @@ corrected AS (
     JOIN trace_clock AS r ON self.received_trace_id = r.trace_id
 )
 SELECT
-    run_id,
-    sent_trace_id,
-    received_trace_id,
-    from_ns AS sent_ns,
-    to_ns AS received_ns,
+    run_id, sent_trace_id, received_trace_id, from_ns AS sent_ns, to_ns AS received_ns,
     to_ns - from_ns AS latency_ns,
-    protocol,
-    source_address,
-    source_port,
-    destination_address,
-    destination_port,
-    identification,
+    protocol, source_address, source_port, destination_address, destination_port, identification,
     sequence_number
 FROM corrected

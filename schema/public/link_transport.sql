@@ -1,4 +1,3 @@
--- name: main.link_transport
 -- description: Messages from publication to take. A negative latency means that the clocks of two
 --     hosts are apart.
 -- grain: one row per take whose publication is known
@@ -15,14 +14,8 @@
 -- column: stored_ns BIGINT [ns]  How long it was stored: from the end of the publication until its
 --     subscription existed, which then read it; NULL: it was not
 SELECT
-    l.run_id,
-    l.publication_id,
-    l.take_id,
-    l.method,
-    l.candidate_count,
-    l.is_self_loop,
-    l.is_loss_affected,
-    l.is_copy,
+    l.run_id, l.publication_id, l.take_id, l.method, l.candidate_count, l.is_self_loop,
+    l.is_loss_affected, l.is_copy,
     CASE WHEN z.take_id IS NULL THEN t.taken_ns - b.end_ns END AS latency_ns,
     z.stored_ns
 FROM store.link_transport AS l

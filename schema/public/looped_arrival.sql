@@ -1,5 +1,3 @@
--- name: main.looped_arrival
--- kind: macro
 -- description: Later takes at the end of a path that are not arrivals, since a path visits no
 --     subscription twice, but that descend from an arrival there through a loop. Any loop through a
 --     subscription consists of subscriptions that it leads to and that lead back to it.
@@ -23,8 +21,7 @@ hop AS MATERIALIZED (
     SELECT DISTINCT c.subscription_id AS from_subscription_id, t.subscription_id
     FROM derive.continued_pair AS c
     JOIN (
-        SELECT DISTINCT run_id, publisher_id, subscription_id
-        FROM derive.flow_transport
+        SELECT DISTINCT run_id, publisher_id, subscription_id FROM derive.flow_transport
     ) AS t ON c.publisher_id = t.publisher_id
     WHERE list_contains(runs, c.run_id) AND list_contains(runs, t.run_id)
 ),
@@ -68,9 +65,7 @@ edge AS MATERIALIZED (
     WHERE list_contains(runs, c.run_id) AND list_contains(runs, t.run_id)
 ),
 -- What is used twice is computed once, not at every step (see derive.graph_reachable).
-known AS (
-    SELECT count(*) AS edge_count FROM edge
-),
+known AS (SELECT count(*) AS edge_count FROM edge),
 descendant (path_id, take_id) AS (
     SELECT a.path_id, a.take_id
     FROM arrival AS a

@@ -1,4 +1,3 @@
--- name: main.message
 -- description: Messages with the names of what they belong to: every published message, once for
 --     each subscription that took it. A message that none took is a row without a take
 --     (main.stat_delivery says why), one whose publication is not known a row without a
@@ -26,15 +25,10 @@ SELECT
         AS publisher,
     CASE WHEN t.take_id IS NOT NULL THEN main.node_label(n.full_name, p.name, p.pid) END
         AS subscriber,
-    b.start_ns AS published_ns,
-    t.taken_ns,
-    l.latency_ns,
-    b.publication_id,
-    l.candidate_count,
+    b.start_ns AS published_ns, t.taken_ns, l.latency_ns, b.publication_id, l.candidate_count,
     coalesce(l.is_loss_affected, t.is_loss_affected, b.is_loss_affected) AS is_loss_affected,
     coalesce(
-        s.is_internal,
-        o.is_internal,
+        s.is_internal, o.is_internal,
         t.take_id IS NULL AND coalesce(b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.publisher_id) IS NULL
     ) AS is_internal
 FROM main.take AS t

@@ -1,5 +1,3 @@
--- name: main.node_label
--- kind: macro
 -- description: The name of a node, or of its process in brackets where the node is not known.
 -- param: full_name VARCHAR  Full name of the node; NULL: not known
 -- param: process_name VARCHAR  Name of its process

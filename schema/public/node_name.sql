@@ -1,5 +1,3 @@
--- name: main.node_name
--- kind: macro
 -- description: Namespace and name of a node, without the host or process behind it where nodes of
 --     several processes have that name at a time (main.node).
 -- param: full_name VARCHAR  Full name of the node

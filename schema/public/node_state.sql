@@ -1,4 +1,3 @@
--- name: main.node_state
 -- description: States of managed nodes (with a lifecycle). The state before the first change lasts
 --     from the creation of the node, or from the first event of its process, the last one until the
 --     last event of the process. A state is left out where the next change leaves another one. A
@@ -11,9 +10,7 @@
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: end_ns BIGINT [epoch ns]  End
 SELECT
-    s.run_id,
-    s.node_id,
-    s.state,
+    s.run_id, s.node_id, s.state,
     derive.corrected_ns(s.start_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS start_ns,
     derive.corrected_ns(s.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS end_ns
 FROM derive.node_state AS s

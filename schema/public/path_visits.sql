@@ -1,5 +1,3 @@
--- name: main.path_visits
--- kind: macro
 -- description: Whether a path, as main.flow_path writes it, visits all of some places, and none of
 --     others.
 -- param: path VARCHAR  The path

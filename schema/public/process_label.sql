@@ -1,20 +1,16 @@
--- name: main.process_label
 -- description: What people call a process: its nodes. The name of a process alone tells little:
---     that of each node of rclpy is python3, that of each container of components
---     component_conta.
+--     that of each node of rclpy is python3, that of each container of components component_conta.
 -- grain: one row per process
 -- column: run_id BIGINT        Run that the row belongs to
 -- column: process_id BIGINT    The process
 -- column: nodes VARCHAR        Full names of its first two nodes, and how many more it has; without
 --     nodes its name and id, in brackets
 SELECT
-    p.run_id,
-    p.process_id,
+    p.run_id, p.process_id,
     main.node_label(
         array_to_string(n.names[:2], ', ')
         || CASE WHEN len(n.names) > 2 THEN printf(', %d more', len(n.names) - 2) ELSE '' END,
-        p.name,
-        p.pid
+        p.name, p.pid
     ) AS nodes
 FROM main.process AS p
 LEFT JOIN (

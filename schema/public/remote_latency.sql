@@ -1,4 +1,3 @@
--- name: main.remote_latency
 -- description: Messages between hosts of different clocks: how long they took, and how wrong that
 --     can be. The bound contains the errors of both clocks.
 -- grain: one row per message between two clocks
@@ -37,22 +36,13 @@ way AS (
         AND l.run_id IN (SELECT run_id FROM store.clock GROUP BY run_id HAVING count(*) > 1)
 )
 SELECT
-    w.run_id,
-    w.publication_id,
-    w.take_id,
-    w.from_host_id,
-    w.to_host_id,
-    w.latency_ns,
+    w.run_id, w.publication_id, w.take_id, w.from_host_id, w.to_host_id, w.latency_ns,
     CASE
         WHEN w.is_comparable THEN ceil(
-            coalesce(
-                f.uncertainty_ns + f.growth * (w.sent_ns - f.at_ns), w.from_uncertainty_ns
-            )
+            coalesce(f.uncertainty_ns + f.growth * (w.sent_ns - f.at_ns), w.from_uncertainty_ns)
             + coalesce(o.uncertainty_ns + o.growth * (w.taken_ns - o.at_ns), w.to_uncertainty_ns)
         )::BIGINT
     END AS uncertainty_ns
 FROM way AS w
-ASOF LEFT JOIN derive.clock_piece AS f
-    ON w.from_clock_id = f.clock_id AND w.sent_ns >= f.from_ns
-ASOF LEFT JOIN derive.clock_piece AS o
-    ON w.to_clock_id = o.clock_id AND w.taken_ns >= o.from_ns
+ASOF LEFT JOIN derive.clock_piece AS f ON w.from_clock_id = f.clock_id AND w.sent_ns >= f.from_ns
+ASOF LEFT JOIN derive.clock_piece AS o ON w.to_clock_id = o.clock_id AND w.taken_ns >= o.from_ns

@@ -1,4 +1,3 @@
--- name: main.run
 -- description: Recordings: the traces that one ingest read. Nothing is ever linked across runs.
 -- grain: one row per ingest of traces that belong together
 -- column: run_id
@@ -21,14 +20,11 @@ WITH extent AS (
     GROUP BY t.run_id
 )
 SELECT
-    self.run_id,
-    self.name,
+    self.run_id, self.name,
     strftime(self.created_at, '%Y-%m-%dT%H:%M:%S.%fZ') AS created_at,
-    self.msgflow_version,
-    self.derivation_hash,
+    self.msgflow_version, self.derivation_hash,
     self.start_ns + coalesce(e.start_shift_ns, 0) AS start_ns,
     self.end_ns + coalesce(e.end_shift_ns, 0) AS end_ns,
-    self.event_count,
-    self.labels
+    self.event_count, self.labels
 FROM store.run AS self
 LEFT JOIN extent AS e ON self.run_id = e.run_id

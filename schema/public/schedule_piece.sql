@@ -1,5 +1,3 @@
--- name: main.schedule_piece
--- kind: macro
 -- description: What threads did in intervals, piece by piece, as a kernel trace shows it. A sleep
 --     that another thread of a ROS process ended is replaced by what that thread did meanwhile, and
 --     so on from waker to waker, until an interrupt or a thread of a process without ROS ends the
@@ -36,8 +34,7 @@ WITH RECURSIVE state AS MATERIALIZED (
             preempted_by_other_thread_id,
             CASE WHEN waker_kind = 'thread' THEN waker_other_thread_id END
         ) AS by_other_thread_id,
-        preempted_by_priority AS by_priority,
-        is_loss_affected
+        preempted_by_priority AS by_priority, is_loss_affected
     FROM main.thread_state
     WHERE list_contains(runs, run_id)
         AND end_ns > (SELECT min(from_ns) FROM query_table(intervals))
@@ -50,8 +47,7 @@ chain AS (
         s.thread_id, s.state, s.priority, s.by_kind, s.by_thread_id, s.by_other_thread_id,
         s.by_priority, s.is_loss_affected
     FROM query_table(intervals) AS i
-    JOIN state AS s
-        ON i.thread_id = s.thread_id AND s.end_ns > i.from_ns AND s.start_ns < i.to_ns
+    JOIN state AS s ON i.thread_id = s.thread_id AND s.end_ns > i.from_ns AND s.start_ns < i.to_ns
     UNION ALL
     SELECT
         c.interval_id, c.wakers + 1,
@@ -78,9 +74,7 @@ boundary AS (
 piece AS MATERIALIZED (
     SELECT
         i.interval_id, i.thread_id, b.at_ns AS from_ns,
-        coalesce(
-            lead(b.at_ns) OVER (PARTITION BY i.interval_id ORDER BY b.at_ns), i.to_ns
-        ) AS to_ns
+        coalesce(lead(b.at_ns) OVER (PARTITION BY i.interval_id ORDER BY b.at_ns), i.to_ns) AS to_ns
     FROM boundary AS b
     JOIN query_table(intervals) AS i ON b.interval_id = i.interval_id
 ),
@@ -98,14 +92,10 @@ told AS (
     ASOF JOIN chain AS c
         ON p.interval_id = c.interval_id AND p.wakers = c.wakers AND p.from_ns >= c.from_ns
     WHERE c.to_ns > p.from_ns
-    QUALIFY row_number() OVER (
-        PARTITION BY p.interval_id, p.from_ns ORDER BY c.wakers DESC
-    ) = 1
+    QUALIFY row_number() OVER (PARTITION BY p.interval_id, p.from_ns ORDER BY c.wakers DESC) = 1
 )
 SELECT
-    p.interval_id,
-    p.from_ns,
-    p.to_ns,
+    p.interval_id, p.from_ns, p.to_ns,
     coalesce(t.wakers, 0) AS wakers,
     coalesce(t.thread_id, p.thread_id) AS thread_id,
     coalesce(
@@ -113,11 +103,7 @@ SELECT
         -- Also of a thread whose states are all at other times.
         CASE WHEN p.thread_id IN (SELECT thread_id FROM store.thread_state) THEN 'unknown' END
     ) AS state,
-    t.priority,
-    t.by_kind,
-    t.by_thread_id,
-    t.by_other_thread_id,
-    t.by_priority,
+    t.priority, t.by_kind, t.by_thread_id, t.by_other_thread_id, t.by_priority,
     coalesce(t.is_loss_affected, false) AS is_loss_affected
 FROM piece AS p
 LEFT JOIN told AS t ON p.interval_id = t.interval_id AND p.from_ns = t.from_ns

@@ -1,4 +1,3 @@
--- name: main.stat_delivery
 -- description: What became of every message at every subscription of its topic. Only the depth of
 --     the queue tells overwriting from loss on the way; incompatible QoS, lifespan and best effort
 --     do not show in a trace. Of a ring buffer whose subscription was not traced, only what was
@@ -17,8 +16,7 @@
 --     'take_failed', 'not_delivered', 'overwritten', 'lost_in_transport', 'pending_at_end' or
 --     'unknown', the first that holds; NULL: delivered
 SELECT
-    run_id,
-    publication_id,
+    run_id, publication_id,
     any_value(publisher_id) AS publisher_id,
     subscription_id,
     min(take_id) AS take_id,
@@ -29,11 +27,7 @@ WHERE subscription_id IS NOT NULL AND is_copy IS NOT TRUE
 GROUP BY run_id, publication_id, subscription_id
 UNION ALL
 SELECT
-    run_id,
-    publication_id,
-    publisher_id,
-    subscription_id,
-    NULL,
+    run_id, publication_id, publisher_id, subscription_id, NULL,
     derive.delivery_status(reason),
     reason
 FROM store.undelivered

@@ -1,4 +1,3 @@
--- name: main.stat_orphan
 -- description: Takes whose publication is not known, and why.
 -- grain: one row per take without a publication
 -- column: run_id BIGINT  Run that the row belongs to
@@ -8,5 +7,4 @@
 --     'clock_set' (the clock that stamps messages was set about then), 'before_tracing',
 --     'publisher_gap', 'publisher_without_events', 'publisher_trace_ends', 'publisher_not_traced',
 --     'ambiguous' or 'unknown', the first that holds
-SELECT run_id, take_id, subscription_id, reason
-FROM store.orphan_take
+SELECT run_id, take_id, subscription_id, reason FROM store.orphan_take

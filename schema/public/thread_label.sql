@@ -1,4 +1,3 @@
--- name: main.thread_label
 -- description: What people call a thread: the nodes of its process, and its own name where it
 --     differs from that of the process, as for threads of the middleware.
 -- grain: one row per thread
@@ -7,8 +6,7 @@
 -- column: label VARCHAR     Nodes of its process (main.process_label), and its name; without nodes
 --     its name
 SELECT
-    t.run_id,
-    t.thread_id,
+    t.run_id, t.thread_id,
     CASE
         WHEN l.nodes LIKE '/%' THEN l.nodes || coalesce(' ' || nullif(t.name, p.name), '')
         ELSE coalesce(t.name, '?')

@@ -1,4 +1,3 @@
--- name: main.topic
 -- description: Topics, by name: who publishes and subscribes, and how many messages there were.
 --     Publishers and subscriptions without a known topic are one row of a run.
 -- grain: one row per run and topic
@@ -14,9 +13,7 @@
 WITH published AS (
     SELECT publisher_id, count(*) AS number FROM store.publication GROUP BY publisher_id
 ),
-taken AS (
-    SELECT subscription_id, count(*) AS number FROM store.take GROUP BY subscription_id
-),
+taken AS (SELECT subscription_id, count(*) AS number FROM store.take GROUP BY subscription_id),
 endpoint AS (
     SELECT
         e.run_id, e.topic_name, e.is_internal,
@@ -36,8 +33,7 @@ endpoint AS (
     LEFT JOIN taken AS m ON e.subscription_id = m.subscription_id
 )
 SELECT
-    run_id,
-    topic_name,
+    run_id, topic_name,
     bool_or(is_internal) AS is_internal,
     coalesce(list(DISTINCT publisher ORDER BY publisher) FILTER (publisher IS NOT NULL), [])
         AS publishers,

@@ -1,5 +1,3 @@
--- name: main.unnamed_topic
--- kind: macro
 -- description: Topics that have no name: neither the trace nor a file of links gives one to any of
 --     the publishers and subscriptions that messages join. One of them stands for all in an entry
 --     of the file: a publisher, where there is one.

@@ -1,4 +1,3 @@
--- name: main.waited_call
 -- description: Calls of services that a callback waited for: it sent the request, and took the
 --     response before it ended. Between them it did nothing but wait, as far as the trace shows.
 -- grain: one row per such call

@@ -1,13 +1,10 @@
--- name: derive.annotation_firing
 -- description: Publications by the outputs of annotations, with the number of inputs that they
 --     have a message of: through an indirect link, or as the message that the publishing callback
 --     instance was called with. Where all inputs have to come together (partial_sync,
 --     approximate_sync), only publications from the callback of an input are listed.
 -- grain: one row per annotation and publication that it applies to
 WITH input AS (
-    SELECT annotation_id, count(*) AS input_count
-    FROM store.annotation_input
-    GROUP BY annotation_id
+    SELECT annotation_id, count(*) AS input_count FROM store.annotation_input GROUP BY annotation_id
 ),
 linked AS (
     SELECT annotation_id, publication_id, count(*) AS link_count
@@ -22,13 +19,11 @@ direct AS (
     FROM store.link_causal AS l
     JOIN store.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
     JOIN store.callback AS c ON i.callback_id = c.callback_id
-    WHERE l.kind = 'direct'
-        AND l.publisher_id IN (SELECT publisher_id FROM store.annotation_output)
+    WHERE l.kind = 'direct' AND l.publisher_id IN (SELECT publisher_id FROM store.annotation_output)
 ),
 -- Its own message is one of the set, or none: there is no direct link.
 filtered AS (
-    SELECT
-        o.annotation_id, b.publication_id, i.callback_instance_id
+    SELECT o.annotation_id, b.publication_id, i.callback_instance_id
     FROM store.annotation AS a
     JOIN store.annotation_output AS o ON a.annotation_id = o.annotation_id
     JOIN store.publication AS b ON o.publisher_id = b.publisher_id
@@ -40,10 +35,7 @@ filtered AS (
     WHERE a.kind = 'approximate_sync' AND b.start_event_id < i.effective_end_event_id
 )
 SELECT
-    a.run_id,
-    a.annotation_id,
-    b.publication_id,
-    d.callback_instance_id,
+    a.run_id, a.annotation_id, b.publication_id, d.callback_instance_id,
     coalesce(n.input_count, 0) AS input_count,
     coalesce(l.link_count, 0) + (i.annotation_id IS NOT NULL)::BIGINT AS linked_count
 FROM store.annotation AS a
@@ -53,8 +45,7 @@ LEFT JOIN input AS n ON a.annotation_id = n.annotation_id
 LEFT JOIN direct AS d ON b.publication_id = d.publication_id
 LEFT JOIN store.annotation_input AS i
     ON a.annotation_id = i.annotation_id AND d.subscription_id = i.subscription_id
-LEFT JOIN linked AS l
-    ON a.annotation_id = l.annotation_id AND b.publication_id = l.publication_id
+LEFT JOIN linked AS l ON a.annotation_id = l.annotation_id AND b.publication_id = l.publication_id
 WHERE a.kind IN ('periodic_async', 'queue')
     OR (a.kind = 'partial_sync' AND i.annotation_id IS NOT NULL)
 UNION ALL
@@ -64,5 +55,4 @@ SELECT
 FROM filtered AS f
 JOIN store.annotation AS a ON f.annotation_id = a.annotation_id
 LEFT JOIN input AS n ON f.annotation_id = n.annotation_id
-LEFT JOIN linked AS l
-    ON f.annotation_id = l.annotation_id AND f.publication_id = l.publication_id
+LEFT JOIN linked AS l ON f.annotation_id = l.annotation_id AND f.publication_id = l.publication_id

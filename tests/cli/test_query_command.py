@@ -17,7 +17,6 @@ from msgflow.sql.header import parse
 Msgflow = Callable[..., Result]
 HEADER = parse(
     """\
--- name: example
 -- title: An example
 -- description: What [it] means.
 -- param: from VARCHAR = NULL     Where it starts

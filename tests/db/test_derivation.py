@@ -17,8 +17,8 @@ from msgflow_sim import Recording, simulate
 
 
 def header(name: str, *needs: str) -> objects.Header:
-    text = f"-- name: {name}\n-- description: A rule.\nFROM {', '.join(needs)}\n"
-    return parse(text, Path("rule.sql"))
+    text = f"-- description: A rule.\nFROM {', '.join(needs)}\n"
+    return parse(text, Path(f"schema/link/{name.partition('.')[2]}.sql"))
 
 
 def test_what_a_table_holds_comes_from_the_object_of_its_name() -> None:

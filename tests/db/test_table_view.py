@@ -132,8 +132,8 @@ def test_a_header_may_name_columns_of_its_table() -> None:
 
 
 def test_a_header_names_no_column_that_the_table_lacks(tmp_path: Path) -> None:
-    path = tmp_path / "public" / "take.sql"
-    path.parent.mkdir()
-    path.write_text("-- name: main.take\n-- description: Takes.\n-- column: taken_us\nSELECT 1\n")
+    path = tmp_path / "schema" / "public" / "take.sql"
+    path.parent.mkdir(parents=True)
+    path.write_text("-- description: Takes.\n-- column: taken_us\nSELECT 1\n")
     with pytest.raises(ValueError, match="store has no column 'taken_us'"):
         objects.completed(objects.read(path))

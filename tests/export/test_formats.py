@@ -17,7 +17,7 @@ from msgflow.sql.header import parse
 
 BIG = 9_007_199_254_740_993
 HEADER = parse(
-    "-- name: example\n-- description: x\n-- column: topic VARCHAR  Topic\n"
+    "-- description: x\n-- column: topic VARCHAR  Topic\n"
     "-- column: median_ns BIGINT [ns]  Half\n-- column: rate_hz DOUBLE [Hz]  Rate\nSELECT 1\n",
     Path("example.sql"),
 )

@@ -101,6 +101,24 @@ def test_a_gap_may_hide_another_use_of_the_slot(intra: Intra, analyse: Analyse) 
     assert analyse(intra.system).rows(LINKS) == []
 
 
+@pytest.mark.parametrize("is_lossy", [False, True])
+def test_a_gap_of_the_trace_in_which_the_message_was_put_in_counts_too(
+    intra: Intra, analyse: Analyse, is_lossy: bool
+) -> None:
+    """A process may be recorded by two sessions: a snapshot, and one that runs all the time."""
+    system, talker = intra.system, Thread(100, trace=1)
+    system.add_source(0, "alpha", "boot", "runtime")
+    system.add_source(1, "alpha", "boot", "snapshot")
+    system.add("ros2:rclcpp_intra_publish", talker, publisher_handle=0x10, message=0xA)
+    system.add(
+        "ros2:rclcpp_ring_buffer_enqueue", talker, buffer=0xB0, index=0, size=1, overwritten=0
+    )
+    if is_lossy:
+        system.lose(cpu=3, trace=1)
+    intra.dequeue(0)
+    assert len(analyse(system).rows(LINKS)) == (not is_lossy)
+
+
 @pytest.mark.thorough
 def test_a_gap_may_have_begun_before_the_message(intra: Intra, analyse: Analyse) -> None:
     """One that was over by then hides nothing."""

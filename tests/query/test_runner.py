@@ -15,7 +15,6 @@ from msgflow.sql.header import Header, parse
 from msgflow.sql.value import Value
 
 PARAMS = """\
--- name: example
 -- description: x
 -- param: from VARCHAR = NULL  Text
 -- param: case VARCHAR {first|last} = 'first'  Choice
@@ -23,7 +22,6 @@ PARAMS = """\
 SELECT 1
 """
 QUERY = """\
--- name: example
 -- description: x
 -- param: channel VARCHAR = NULL  Only this one
 -- column: topic VARCHAR [topic]  Topic
@@ -132,26 +130,24 @@ def test_a_window_without_data_is_said(
 
 
 def test_a_query_without_a_window_refuses_one(connection: duckdb.DuckDBPyConnection) -> None:
-    plain = header("-- name: example\n-- description: x\nSELECT 1 AS one\n")
+    plain = header("-- description: x\nSELECT 1 AS one\n")
     with pytest.raises(UsageError, match="no time window — example"):
         run_query(connection, plain, {}, Slice(start="0"))
     assert run_query(connection, plain, {}).to_arrow().to_pylist() == [{"one": 1}]
 
 
 def test_a_query_that_fails_is_named(connection: duckdb.DuckDBPyConnection) -> None:
-    failing = header("-- name: example\n-- description: x\nSELECT error('too bad')\n")
+    failing = header("-- description: x\nSELECT error('too bad')\n")
     with pytest.raises(QueryError, match=r"the query failed: .*too bad.* — example"):
         run_query(connection, failing, {})
 
 
 NAMED = """\
--- name: example
 -- description: x
 -- column: what VARCHAR [{kind}]  What
 SELECT '/a' AS what, $runs AS runs
 """
 TOPICS = """\
--- name: example
 -- description: x
 -- param: from VARCHAR = NULL  Topic
 -- param: to VARCHAR = NULL  Topic
@@ -251,8 +247,7 @@ def test_takes_that_no_run_has_are_refused(connection: duckdb.DuckDBPyConnection
     connection.execute("CREATE TABLE take (take_id BIGINT, run_id BIGINT)")
     connection.execute("INSERT INTO take VALUES (7, 1), (8, 2)")
     query = header(
-        "-- name: example\n-- description: x\n-- param: take BIGINT = NULL  Take\n"
-        "SELECT $take AS id, $runs AS runs\n"
+        "-- description: x\n-- param: take BIGINT = NULL  Take\nSELECT $take AS id, $runs AS runs\n"
     )
     for run, given in (("first", 7), ("all", 8), ("first", None)):
         (row,) = run_query(connection, query, {"take": given}, Slice(run)).to_arrow().to_pylist()
@@ -461,9 +456,7 @@ def test_how_far_corrected_clocks_can_be_wrong_is_said(
 
 @pytest.mark.parametrize("given", [1, "1", None])
 def test_the_minimum_itself_will_do(given: Value) -> None:
-    least = header(
-        "-- name: example\n-- description: x\n-- param: depth BIGINT {1..} = 3  x\nSELECT 1\n"
-    )
+    least = header("-- description: x\n-- param: depth BIGINT {1..} = 3  x\nSELECT 1\n")
     assert bind(least, {"depth": given}) == {"depth": None if given is None else 1}
     for less in (0, "-1"):
         with pytest.raises(UsageError, match=f"--depth is at least 1 — {less}") as raised:
@@ -502,7 +495,6 @@ def test_parameters_that_do_not_fit(given: dict[str, Value], message: str, hint:
 
 
 STEPS = """\
--- name: example
 -- description: An example.
 -- param: least VARCHAR = '/a'  Topics from here on
 -- column: run_id BIGINT  Run

@@ -14,7 +14,7 @@ from msgflow.version import __version__
 
 BIG = 2**63 - 1
 HEADER = parse(
-    "-- name: example\n-- description: x\n-- column: at_ns BIGINT [epoch ns]  When\n"
+    "-- description: x\n-- column: at_ns BIGINT [epoch ns]  When\n"
     "-- column: topic VARCHAR  Topic\nSELECT 1\n",
     Path("example.sql"),
 )

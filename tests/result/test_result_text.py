@@ -15,7 +15,7 @@ from msgflow.run.choice import Run
 from msgflow.sql.header import parse
 
 HEADER = parse(
-    "-- name: example\n-- title: An <b>example</b>\n-- description: x\n"
+    "-- title: An <b>example</b>\n-- description: x\n"
     "-- column: topic VARCHAR  Topic\n-- column: wait_ns BIGINT [ns]  Wait\nSELECT 1\n",
     Path("example.sql"),
 )

@@ -14,7 +14,7 @@ from msgflow.sql.header import parse
 
 START = 1_741_944_413_000_000_000
 HEADER = parse(
-    "-- name: example\n-- description: x\n-- column: run_id BIGINT  Run\n"
+    "-- description: x\n-- column: run_id BIGINT  Run\n"
     "-- column: at_ns BIGINT [epoch ns]  When\n-- column: wait_ns BIGINT [ns]  How long\n"
     "-- column: end_ns BIGINT [epoch ns]  Until\n-- column: end_s VARCHAR  A name that is taken\n"
     "-- column: late BIGINT [ns]  Not named after its unit\n-- column: count BIGINT  n\nSELECT 1\n",

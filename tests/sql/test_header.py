@@ -9,7 +9,6 @@ from msgflow.sql.header import Column, Header, HeaderError, Param, parse
 PATH = Path("queries/example.sql")
 
 FULL = """\
--- name: example
 -- title: An example
 -- description: What it means,
 --     on two lines.
@@ -42,7 +41,7 @@ SELECT 1
 
 
 def parse_with(line: str) -> Header:
-    return parse(f"-- name: example\n-- description: x\n{line}\nSELECT 1\n", PATH)
+    return parse(f"-- title: Example\n-- description: x\n{line}\nSELECT 1\n", PATH)
 
 
 def test_everything_is_parsed() -> None:
@@ -93,8 +92,8 @@ def test_an_object_needs_what_its_statements_name() -> None:
 
 
 def test_an_object_does_not_need_itself() -> None:
-    text = "-- name: main.a\n-- description: x\nCREATE MACRO main.a() AS TABLE FROM main.b\n"
-    assert parse(text, PATH).needs == ("main.b",)
+    text = "-- description: x\nCREATE MACRO main.a() AS TABLE FROM main.b\n"
+    assert parse(text, Path("schema/public/a.sql")).needs == ("main.b",)
 
 
 @pytest.mark.parametrize(("limits", "maximum"), [("1..", None), ("1..64", 64)])
@@ -112,22 +111,23 @@ def test_a_note_is_kept() -> None:
 
 
 def test_the_title_defaults_to_the_name() -> None:
-    assert parse("-- name: example\n-- description: x\nSELECT 1\n", PATH).title == "example"
+    assert parse("-- description: x\nSELECT 1\n", PATH).title == "example"
 
 
 def test_a_macro_keeps_its_whole_statement() -> None:
-    header = parse("-- name: m\n-- kind: macro\n-- description: x\nCREATE MACRO m() AS 1\n", PATH)
+    body = "-- Of a table.\nCREATE MACRO m() AS 1\n"
+    header = parse(f"-- description: x\n\n{body}", PATH)
     assert header.kind == "macro"
-    assert header.body == "CREATE MACRO m() AS 1\n"
+    assert header.body == body
 
 
 @pytest.mark.parametrize(
     ("line", "message"),
     [
         ("-- colour: red", "example.sql:3: unknown field 'colour'"),
-        ("-- name: again", "example.sql:3: 'name' stands twice"),
+        ("-- title: again", "example.sql:3: 'title' stands twice"),
         ("--param: a BIGINT  x", "example.sql:3: expected '-- field: value'"),
-        ("-- kind: table", "kind 'table' is not one of view, inline, macro"),
+        ("-- kind: macro", "says only that its kind is 'inline', not 'macro'"),
         ("-- param: a", "example.sql:3: expected '-- param: name TYPE"),
         ("-- param: a BIGINT = 1 one space", "expected '-- param: name TYPE"),
         ("-- param: a BIGINT = one  Default", "'one' is not NULL, TRUE, FALSE, a number"),
@@ -148,7 +148,7 @@ def test_a_bad_line_is_named(line: str, message: str) -> None:
 
 
 def test_names_alone_are_declared_by_the_first_file_that_has_them(tmp_path: Path) -> None:
-    head = "-- name: x\n-- description: x\n"
+    head = "-- description: x\n"
     for name in ("a", "b"):
         text = f"{head}-- param: depth BIGINT = 1  Of {name}\n-- column: {name} BIGINT  Of {name}\n"
         (tmp_path / f"{name}.sql").write_text(f"{text}SELECT 1\n")
@@ -169,11 +169,10 @@ def test_names_alone_are_declared_by_the_first_file_that_has_them(tmp_path: Path
         ("SELECT 1\n", "there is no header"),
         ("", "there is no header"),
         ("--     first\nSELECT 1\n", "starts with a continuation"),
-        ("-- description: x\nSELECT 1\n", "the header has no 'name'"),
-        ("-- name: x\nSELECT 1\n", "the header has no 'description'"),
-        ("-- name: x\n-- description: x\n\n", "there is no SQL below the header"),
+        ("-- title: x\nSELECT 1\n", "the header has no 'description'"),
+        ("-- description: x\n\n", "there is no SQL below the header"),
         (
-            "-- name: x\n-- description: x\n-- brief: a\nSELECT 1\n",
+            "-- description: x\n-- brief: a\nSELECT 1\n",
             "brief names a column that there is not: 'a'",
         ),
     ],

@@ -11,14 +11,14 @@ from pathlib import Path
 import duckdb
 import pytest
 from each import each
-from sql_files import LAYERS, SCHEMAS, SqlFile, sql_files, sql_paths
+from sql_files import LAYERS, SqlFile, sql_files, sql_paths
 
 from msgflow.cli.query_command import COMMON_OPTIONS
 from msgflow.database import Database
 from msgflow.db import objects
 from msgflow.query.runner import RESERVED
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
-from msgflow.sql.header import Header
+from msgflow.sql.header import SCHEMAS, Header
 from msgflow.sql.statement import internal_sql
 from msgflow.view.page_query import DIRECTORY, page_query
 
@@ -91,11 +91,6 @@ def declared(file: SqlFile) -> list[tuple[str, str]]:
 def test_every_sql_file_lies_in_a_known_folder() -> None:
     assert {layer for layer, _ in sql_paths()} <= set(LAYERS)
     assert FILES
-
-
-@each(FILES)
-def test_the_name_is_the_place(file: SqlFile) -> None:
-    assert file.header.name == file.expected_name
 
 
 @each(FILES)
@@ -198,9 +193,8 @@ def test_headers_of_what_the_program_asks_are_those_of_its_sql(
     assert named | UNDECLARED == statement.named_parameters | UNDECLARED
     values = {"run_id": 1, "runs": [1], "start_ns": 0, "end_ns": 1, "kind": "take", "id": 1}
     values |= {p.name: [1, 1] if p.type.endswith("[]") else 1 for p in file.header.params} | values
-    # Those without columns say of what they have the columns; some read what is made for them.
-    made = ("changes", "fleet_run_value", "fleet_comparison", "bag_joined", "bag_topic")
-    made += ("node_share", "change_part", "otlp_request")
+    # Only what is shown as a result declares columns; some of that reads what is made for it.
+    made = ("changes", "fleet_comparison", "bag_topic", "change_part")
     made += ("suspect", "verdict", "warm_up", "why_callback")
     if file.header.columns and name not in made:
         assert described(internal_sql().run(connection, name, values)) == declared(file)
@@ -277,5 +271,5 @@ def test_defaults_of_a_public_macro_are_those_that_it_declares(
 
 @each([*VIEWS, *MACROS])
 def test_the_database_has_the_object_in_its_schema(file: SqlFile, defined: set[str]) -> None:
+    assert file.header.name == f"{SCHEMAS[file.layer]}.{file.path.stem}"
     assert file.header.name in defined
-    assert file.header.name.startswith(f"{SCHEMAS[file.layer]}.")

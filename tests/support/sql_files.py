@@ -15,21 +15,6 @@ LAYERS = (
     "alignment", "model", "kernel", "overlap", "store", "link", "clock", "delivery", "flow", "stat",
     "public", "health", "queries", "internal",
 )  # fmt: skip
-# The schema in the database of what lies in a folder below schema/.
-SCHEMAS = {
-    "alignment": "staging",
-    "model": "staging",
-    "kernel": "staging",
-    "overlap": "overlap",
-    "link": "derive",
-    "clock": "derive",
-    "delivery": "derive",
-    "flow": "derive",
-    "stat": "derive",
-    "public": "main",
-    "health": "finding",
-    "internal": "internal",
-}
 
 
 @dataclass(frozen=True)
@@ -42,12 +27,6 @@ class SqlFile:
 
     def __str__(self) -> str:
         return f"{self.layer}/{self.path.stem}"
-
-    @property
-    def expected_name(self) -> str:
-        """The name that the header has to give."""
-        schema = SCHEMAS.get(self.layer)
-        return self.path.stem if schema is None else f"{schema}.{self.path.stem}"
 
     @property
     def references(self) -> set[str]:

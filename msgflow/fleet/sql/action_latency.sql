@@ -1,41 +1,25 @@
--- name: fleet.action_latency
 -- title: Latency of actions by action and client, of many runs
 -- description: As the query action-latency says it of one run. Quantiles of runs cannot be added
 --     up: the largest of any run stands for them.
 -- grain: one row per action server, client and group of runs
--- column: label_group BIGINT         Group of runs
--- column: action_name VARCHAR        Action
--- column: server VARCHAR [node]  Node of the action server; empty: not known
--- column: client VARCHAR [node]  Node of the action client; empty: not known
--- column: runs BIGINT                Runs that have it
+-- like: queries.action-latency, service_latency
+-- column: label_group, action_name, server, client, runs
 -- column: goals BIGINT               Goals sent or taken
--- column: accepted BIGINT            Goals that the server accepted
--- column: rejected BIGINT            Goals that the server rejected
--- column: not_answered BIGINT        Goals without a sign of an answer
--- column: asked BIGINT               Accepted goals whose result the client asked for
--- column: finished BIGINT            Goals whose result the client took
--- column: cancelled BIGINT           Goals for which the server accepted a request to cancel
--- column: doubtful BIGINT            Goals for which it is not known which result is theirs
+-- column: accepted, rejected, not_answered, asked, finished, cancelled, doubtful
 -- column: overlapping BIGINT         Goals during which the server had another one
--- column: feedback BIGINT            Feedback messages known to be of one of these goals
+-- column: feedback
 -- column: accept_median_most_ns BIGINT [ns]  Largest median time from the sending of the goal to
 --     the take of the answer
 -- column: accept_p99_most_ns BIGINT [ns]     Largest 99 % quantile of these times
--- column: accept_max_ns BIGINT [ns]          Longest of these times
--- column: result_min_ns BIGINT [ns]          Shortest time from the sending of the goal to the take
---     of the result
+-- column: accept_max_ns, result_min_ns
 -- column: result_median_most_ns BIGINT [ns]  Largest median of these times
 -- column: result_p99_most_ns BIGINT [ns]     Largest 99 % quantile of these times
--- column: result_max_ns BIGINT [ns]          Longest of these times
--- column: loss_affected BIGINT       Goals with a gap of a trace while they lasted
+-- column: result_max_ns, loss_affected
 -- brief: action_name, client, result_median_most_ns, result_p99_most_ns, result_max_ns, runs,
 --     goals, accepted, rejected, finished, cancelled, server, accept_p99_most_ns, not_answered,
 --     doubtful
 SELECT
-    g.label_group,
-    a.action_name,
-    a.server,
-    a.client,
+    g.label_group, a.action_name, a.server, a.client,
     count(DISTINCT a.run) AS runs,
     sum(a.goals)::BIGINT AS goals,
     sum(a.accepted)::BIGINT AS accepted,

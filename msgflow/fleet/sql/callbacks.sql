@@ -1,32 +1,18 @@
--- name: fleet.callbacks
 -- title: Callback durations and periods, of many runs
 -- description: As the query callbacks says it of one run. Quantiles of several callbacks
 --     are off by less than 1 %, all else is exact.
 -- grain: one row per node, callback and group of runs
--- column: label_group BIGINT        Group of runs
--- column: node VARCHAR [node]  Node of the callback
--- column: callback VARCHAR [callback]  What triggers it
--- column: runs BIGINT               Runs that have it
+-- like: queries.callbacks, waits
+-- column: label_group, node, callback, runs
 -- column: count BIGINT              Callback instances
--- column: open BIGINT               Instances without an end
--- column: period_min_ns BIGINT [ns]     Shortest time from one start to the next
--- column: period_median_ns BIGINT [ns]  Median time from one start to the next
--- column: period_max_ns BIGINT [ns]     Longest time from one start to the next
--- column: min_ns BIGINT [ns]        Shortest duration
--- column: median_ns BIGINT [ns]     Median duration
--- column: mean_ns BIGINT [ns]       Mean duration
--- column: p95_ns BIGINT [ns]        95 % of the durations are at most this
--- column: p99_ns BIGINT [ns]        99 % of the durations are at most this
--- column: max_ns BIGINT [ns]        Longest duration
--- column: total_ns BIGINT [ns]      Sum of the durations
+-- column: open, period_min_ns, period_median_ns, period_max_ns, min_ns, median_ns, mean_ns, p95_ns,
+--     p99_ns, max_ns, total_ns
 -- column: symbol VARCHAR            Functions registered for it
--- column: is_internal BOOLEAN       Infrastructure of ROS
+-- column: is_internal
 -- brief: node, callback, median_ns, max_ns, p95_ns, runs, count, period_median_ns, p99_ns, mean_ns
 WITH merged AS (
     SELECT
-        g.label_group,
-        c.node,
-        c.callback,
+        g.label_group, c.node, c.callback,
         count(DISTINCT c.run) AS runs,
         sum(c.count)::BIGINT AS count,
         sum(c.open)::BIGINT AS open,
@@ -46,26 +32,16 @@ WITH merged AS (
     GROUP BY g.label_group, c.node, c.callback
 )
 SELECT
-    m.label_group,
-    m.node,
-    m.callback,
-    m.runs,
-    m.count,
-    m.open,
-    m.period_min_ns,
+    m.label_group, m.node, m.callback, m.runs, m.count, m.open, m.period_min_ns,
     coalesce(
         m.period_median_ns, greatest(m.period_min_ns, least(m.period_max_ns, p.median_ns))
     ) AS period_median_ns,
-    m.period_max_ns,
-    m.min_ns,
+    m.period_max_ns, m.min_ns,
     coalesce(m.median_ns, greatest(m.min_ns, least(m.max_ns, d.median_ns))) AS median_ns,
     round(m.total_ns / nullif(m.count - m.open, 0))::BIGINT AS mean_ns,
     coalesce(m.p95_ns, greatest(m.min_ns, least(m.max_ns, d.p95_ns))) AS p95_ns,
     coalesce(m.p99_ns, greatest(m.min_ns, least(m.max_ns, d.p99_ns))) AS p99_ns,
-    m.max_ns,
-    m.total_ns,
-    m.symbol,
-    m.is_internal
+    m.max_ns, m.total_ns, m.symbol, m.is_internal
 FROM merged AS m
 LEFT JOIN distributed AS d
     ON d.measure = 'callback_duration' AND m.label_group = d.label_group

@@ -1,4 +1,3 @@
--- name: fleet.distributed
 -- title: Quantiles of times that were counted in buckets
 -- description: Counts of all runs of a group are added, then the bucket is looked up that holds the
 --     quantile. What stands for a bucket is off by less than 1 % of any time in it.
@@ -12,23 +11,14 @@ WITH summed AS (
 ),
 ranked AS (
     SELECT
-        label_group,
-        measure,
-        node,
-        subject,
-        bucket,
-        sum(number) OVER (
-            PARTITION BY label_group, measure, node, subject ORDER BY bucket
-        ) AS upto,
+        label_group, measure, node, subject, bucket,
+        sum(number) OVER (PARTITION BY label_group, measure, node, subject ORDER BY bucket) AS upto,
         sum(number) OVER (PARTITION BY label_group, measure, node, subject) AS total
     FROM summed
 ),
 quantile AS (
     SELECT
-        label_group,
-        measure,
-        node,
-        subject,
+        label_group, measure, node, subject,
         min(bucket) FILTER (WHERE upto >= ceil(0.5 * total)) AS median,
         min(bucket) FILTER (WHERE upto >= ceil(0.95 * total)) AS p95,
         min(bucket) FILTER (WHERE upto >= ceil(0.99 * total)) AS p99
@@ -36,10 +26,7 @@ quantile AS (
     GROUP BY label_group, measure, node, subject
 )
 SELECT
-    label_group,
-    measure,
-    node,
-    subject,
+    label_group, measure, node, subject,
     round(sign(median) * 2 / 2.02 * pow(1.02::DOUBLE, abs(median) - 1))::BIGINT AS median_ns,
     round(sign(p95) * 2 / 2.02 * pow(1.02::DOUBLE, abs(p95) - 1))::BIGINT AS p95_ns,
     round(sign(p99) * 2 / 2.02 * pow(1.02::DOUBLE, abs(p99) - 1))::BIGINT AS p99_ns

@@ -1,40 +1,19 @@
--- name: fleet.e2e_latency
 -- title: End-to-end latency by path, of many runs
 -- description: As the query e2e-latency says it of one run, exactly: computed from the flows of all
 --     runs. Paths of one text are one path.
 -- grain: one row per path and group of runs
 -- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
 --     count: the first or last arrival of each root, the newest root of each arrival, or all
+-- like: queries.e2e-latency
 -- column: label_group BIGINT       Group of runs
 -- column: runs BIGINT              Runs that have the path
 -- column: roots BIGINT             Flows that began
--- column: reached BIGINT           Roots that reached the end of the path
--- column: superseded BIGINT        Roots replaced by a newer input before they were used
--- column: dropped BIGINT           Roots that ended in a full queue: newer messages came instead
--- column: lost BIGINT              Roots that were lost on the way
--- column: no_output BIGINT         Roots that ended at a node that did not publish
--- column: not_connected BIGINT     Roots that ended before or after a publisher and a subscription
---     were connected
--- column: unknown BIGINT           Roots that end where the trace does not show
--- column: cut_by_recording BIGINT  Roots too close to the start or end of a recording to know
--- column: loss_affected BIGINT     Roots with a gap of a trace in their time
--- column: ambiguous BIGINT         Pairs that pass a link that may be another one (a
---     candidate_count above 1)
--- column: pairs BIGINT             Pairs of root and arrival that the latencies are computed from
--- column: stored BIGINT            Pairs left out of the latencies: a message on the way was
---     published before its subscription existed, and stored until then
--- column: looped BIGINT            Later messages at the end of the path that descend from an
---     arrival there through a loop
--- column: min_ns BIGINT [ns]       Shortest latency
--- column: median_ns BIGINT [ns]    Median latency
--- column: mean_ns BIGINT [ns]      Mean latency
--- column: p95_ns BIGINT [ns]       95 % of the latencies are at most this
--- column: p99_ns BIGINT [ns]       99 % of the latencies are at most this
--- column: max_ns BIGINT [ns]       Longest latency
+-- column: reached, superseded, dropped, lost, no_output, not_connected, unknown, cut_by_recording,
+--     loss_affected, ambiguous, pairs, stored, looped
+-- column: min_ns, median_ns, mean_ns, p95_ns, p99_ns, max_ns
 -- column: sink_event VARCHAR       Events that stopped the clock
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond the limits of the query
--- column: reasons VARCHAR          Why roots did not reach the end of the path, with counts
--- column: path VARCHAR [path]  Nodes and topics
+-- column: reasons, path
 -- brief: path, median_ns, p95_ns, max_ns, runs, reached, roots, dropped, lost,
 --     ambiguous, superseded, no_output, p99_ns, not_connected, unknown, cut_by_recording, reasons,
 --     mean_ns, min_ns, loss_affected, pairs, stored
@@ -52,11 +31,7 @@ WITH arrival AS MATERIALIZED (
     JOIN run_group AS g ON f.run = g.run
 ),
 completeness AS (
-    SELECT
-        label_group,
-        path,
-        count(*) AS roots,
-        histogram(status)::MAP(VARCHAR, BIGINT) AS number
+    SELECT label_group, path, count(*) AS roots, histogram(status)::MAP(VARCHAR, BIGINT) AS number
     FROM arrival
     WHERE is_first IS NOT false
     GROUP BY label_group, path
@@ -72,8 +47,7 @@ affected AS (
 ),
 reason AS (
     SELECT
-        label_group,
-        path,
+        label_group, path,
         string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
     FROM (
         SELECT label_group, path, reason, count(*) AS number
@@ -85,8 +59,7 @@ reason AS (
 ),
 latency AS (
     SELECT
-        label_group,
-        path,
+        label_group, path,
         count(latency_ns) AS pairs,
         count(*) - count(latency_ns) AS stored,
         count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
@@ -101,8 +74,7 @@ latency AS (
 ),
 known AS (
     SELECT
-        g.label_group,
-        e.path,
+        g.label_group, e.path,
         count(DISTINCT e.run) AS runs,
         sum(e.looped)::BIGINT AS looped,
         bool_or(e.is_cut) AS is_cut
@@ -111,8 +83,7 @@ known AS (
     GROUP BY g.label_group, e.path
 )
 SELECT
-    k.label_group,
-    k.runs,
+    k.label_group, k.runs,
     coalesce(c.roots, 0) AS roots,
     coalesce(c.number['reached'], 0) AS reached,
     coalesce(c.number['superseded'], 0) AS superseded,
@@ -126,17 +97,12 @@ SELECT
     coalesce(l.ambiguous, 0) AS ambiguous,
     coalesce(l.pairs, 0) AS pairs,
     coalesce(l.stored, 0) AS stored,
-    k.looped,
-    l.min_ns,
+    k.looped, l.min_ns,
     l.quantiles[1] AS median_ns,
     l.mean_ns,
     l.quantiles[2] AS p95_ns,
     l.quantiles[3] AS p99_ns,
-    l.max_ns,
-    l.sink_event,
-    k.is_cut,
-    r.reasons,
-    k.path
+    l.max_ns, l.sink_event, k.is_cut, r.reasons, k.path
 FROM known AS k
 LEFT JOIN completeness AS c ON k.label_group = c.label_group AND k.path = c.path
 LEFT JOIN affected AS a ON k.label_group = a.label_group AND k.path = a.path

@@ -1,32 +1,24 @@
--- name: fleet.executor_usage
 -- title: What executor threads spent their time on, of many runs
 -- description: As the query executor-usage says it of one run; threads of one process and kind of
 --     executor are put together. The callback share is the share of all their time.
 -- grain: one row per host, process, kind of executor and group of runs
--- column: label_group BIGINT        Group of runs
--- column: host VARCHAR [host]  Host
--- column: process VARCHAR           Process name
--- column: executor_kind VARCHAR     Kind of executor
--- column: runs BIGINT               Runs that have it
+-- like: queries.executor-usage, service_latency
+-- column: label_group, host, process, executor_kind, runs
 -- column: threads BIGINT            Threads of all these runs
 -- column: seen_ns BIGINT [ns]       Time for which threads were seen
 -- column: wait_ns BIGINT [ns]       Waiting for work
 -- column: select_ns BIGINT [ns]     Looking for what is ready
--- column: take_ns BIGINT [ns]       Taking messages, up to the callback
+-- column: take_ns
 -- column: callback_ns BIGINT [ns]   In callbacks, services included; nested time counts once
 -- column: blocked_ns BIGINT [ns]    Waiting for the lock of a multi-threaded executor after a
 --     callback
 -- column: unknown_ns BIGINT [ns]    Not known
--- column: callbacks BIGINT          Callbacks that began
--- column: callback_share DOUBLE [share] Callback time divided by time seen, 0 to 1
+-- column: callbacks, callback_share
 -- column: callback_share_max DOUBLE [share] The same of the busiest thread of any run
 -- brief: process, callback_share, callback_share_max, runs, threads, callback_ns, blocked_ns,
 --     wait_ns, callbacks, host, select_ns, take_ns, seen_ns, unknown_ns, executor_kind
 SELECT
-    g.label_group,
-    u.host,
-    u.process,
-    u.executor_kind,
+    g.label_group, u.host, u.process, u.executor_kind,
     count(DISTINCT u.run) AS runs,
     count(*) AS threads,
     sum(u.seen_ns)::BIGINT AS seen_ns,

@@ -1,8 +1,6 @@
--- name: fleet.info_findings
 -- title: What is worth knowing about recordings before trusting a number, and how many have it
 -- description: Findings of the query info --section findings over many runs, with cause and cure.
---     Each names
---     the run that has most of it.
+--     Each names the run that has most of it.
 -- grain: one row per kind of finding and group of runs
 -- column: label_group BIGINT  Group of runs
 -- column: severity VARCHAR    'error' where results are wrong or missing, 'warning' where they may
@@ -19,9 +17,7 @@
 -- column: cure VARCHAR        What to do about it
 -- brief: severity, title, runs, count, worst_run, subject, places, cure
 SELECT
-    g.label_group,
-    f.severity,
-    f.name,
+    g.label_group, f.severity, f.name,
     any_value(f.title) AS title,
     count(DISTINCT f.run) AS runs,
     count(*) AS places,

@@ -1,4 +1,3 @@
--- name: fleet.info_quality
 -- title: Data quality: what is missing, and in how many runs
 -- description: What msgflow info --section quality says of each run, added up over all its traces
 --     and over all its processes, and over the runs. Each topic has a row.
@@ -15,8 +14,7 @@
 -- brief: scope, topic, measure, runs, affected, total, affected_percent
 -- answer: affected
 SELECT
-    g.label_group,
-    q.scope,
+    g.label_group, q.scope,
     CASE WHEN q.scope = 'topic' THEN q.subject END AS topic,
     q.measure,
     count(DISTINCT q.run) FILTER (WHERE q.affected > 0) AS runs,

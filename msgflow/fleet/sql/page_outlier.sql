@@ -1,4 +1,3 @@
--- name: fleet.page_outlier
 -- title: Runs that stand out, by path
 -- description: Runs whose median is further from that of the others than five times what is usual
 --     (the median of the distances, scaled to a standard deviation) and than a twentieth of it.
@@ -25,9 +24,7 @@ spread AS (
     GROUP BY p.path
 )
 SELECT
-    p.path,
-    p.run,
-    p.median_ns,
+    p.path, p.run, p.median_ns,
     round(s.usual)::BIGINT AS usual_ns,
     100 * (p.median_ns - s.usual) / nullif(s.usual, 0) AS change_percent
 FROM page_point AS p

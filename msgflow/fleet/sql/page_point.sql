@@ -1,21 +1,16 @@
--- name: fleet.page_point
 -- title: Latencies of every path, run by run
 -- kind: inline
 -- description: Quantiles of the first arrivals of each run, and how many flows began, arrived,
 --     and were dropped or lost.
 -- grain: one row per path and run
--- column: path VARCHAR [path]     Nodes and topics
--- column: run VARCHAR             Key of the run
--- column: median_ns BIGINT [ns]   Median latency
--- column: p99_ns BIGINT [ns]      99 % of the latencies are at most this
--- column: max_ns BIGINT [ns]      Longest latency
+-- like: queries.e2e-latency, page_worst
+-- column: path, run, median_ns, p99_ns, max_ns
 -- column: roots BIGINT            Flows that began
 -- column: reached BIGINT          Flows that reached the end of the path
 -- column: dropped BIGINT          Flows that ended in a full queue
 -- column: lost BIGINT             Flows that were lost on the way
 SELECT
-    f.path,
-    f.run,
+    f.path, f.run,
     quantile_disc(f.latency_ns, 0.5) FILTER (WHERE f.status = 'reached') AS median_ns,
     quantile_disc(f.latency_ns, 0.99) FILTER (WHERE f.status = 'reached') AS p99_ns,
     max(f.latency_ns) FILTER (WHERE f.status = 'reached') AS max_ns,

@@ -1,4 +1,3 @@
--- name: fleet.page_run
 -- title: Runs, as the page of a lake needs them
 -- description: The chosen runs in the order of their time.
 -- grain: one row per run
@@ -11,13 +10,11 @@
 -- column: source VARCHAR      What it was read from
 -- column: has_database BOOLEAN  The lake has its database
 SELECT
-    run,
-    name,
+    run, name,
     strftime(make_timestamp(start_ns // 1000), '%Y-%m-%d %H:%M:%S') AS began,
     start_ns / 1e9 AS start_s,
     list_transform(map_entries(labels), lambda entry: entry.key || '=' || entry.value) AS labels,
-    event_count,
-    source,
+    event_count, source,
     database_part IS NOT NULL AS has_database
 FROM run
 ORDER BY start_ns, run

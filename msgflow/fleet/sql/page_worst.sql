@@ -1,4 +1,3 @@
--- name: fleet.page_worst
 -- title: The slowest flows of every path
 -- description: Flows that reached the end, by their first arrival.
 -- grain: one row per flow
@@ -9,13 +8,7 @@
 -- column: at_ns BIGINT [ns]       Start of the root, since the start of the run
 -- column: root_kind VARCHAR       'callback_instance', 'publication' or 'take'
 -- column: root_id BIGINT          Identity of the root in the database of the run
-SELECT
-    f.path,
-    f.run,
-    f.latency_ns,
-    f.root_ns - r.start_ns AS at_ns,
-    f.root_kind,
-    f.root_id
+SELECT f.path, f.run, f.latency_ns, f.root_ns - r.start_ns AS at_ns, f.root_kind, f.root_id
 FROM flow AS f
 JOIN run AS r ON f.run = r.run
 WHERE f.is_first AND f.status = 'reached'

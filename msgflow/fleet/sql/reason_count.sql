@@ -1,4 +1,3 @@
--- name: fleet.reason_count
 -- title: Reasons of messages that were not taken, counted over runs
 -- description: Adds up what stands in the column reasons of delivery as 'reason 3, other 2'.
 -- grain: one row per group of runs, topic, receiving node and column
@@ -18,20 +17,14 @@ part AS (
 ),
 counted AS (
     SELECT
-        label_group,
-        topic_name,
-        subscriber,
-        name,
+        label_group, topic_name, subscriber, name,
         regexp_extract(text, '^(.*) \d+$', 1) AS reason,
         sum(regexp_extract(text, ' (\d+)$', 1)::BIGINT) AS number
     FROM part
     GROUP BY label_group, topic_name, subscriber, name, reason
 )
 SELECT
-    label_group,
-    topic_name,
-    subscriber,
-    name,
+    label_group, topic_name, subscriber, name,
     string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS text
 FROM counted
 GROUP BY label_group, topic_name, subscriber, name

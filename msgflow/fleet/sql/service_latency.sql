@@ -1,31 +1,20 @@
--- name: fleet.service_latency
 -- title: Latency of services by service and client, of many runs
 -- description: As the query service-latency says it of one run. Quantiles of runs cannot be added
 --     up: the largest of any run stands for them.
 -- grain: one row per service, client and group of runs
+-- like: queries.service-latency
 -- column: label_group BIGINT          Group of runs
--- column: service_name VARCHAR        Service
--- column: server VARCHAR [node]  Node of the service; empty: not known
--- column: client VARCHAR [node]  Node of the client; empty: not known
+-- column: service_name, server, client
 -- column: runs BIGINT                 Runs that have it
 -- column: requests BIGINT             Requests sent or taken
--- column: answered BIGINT             Requests whose response the client took
--- column: not_taken BIGINT            Requests that no service was seen to take
--- column: not_answered BIGINT         Requests that were taken, with no sign of a response
--- column: not_received BIGINT         Requests whose response was sent, but not seen to be taken
--- column: negative BIGINT             Requests or responses that were taken before they were sent
--- column: round_trip_min_ns BIGINT [ns]     Shortest round trip
+-- column: answered, not_taken, not_answered, not_received, negative, round_trip_min_ns
 -- column: round_trip_median_most_ns BIGINT [ns]  Largest median round trip
 -- column: round_trip_p99_most_ns BIGINT [ns]     Largest 99 % quantile of the round trips
--- column: round_trip_max_ns BIGINT [ns]     Longest round trip
--- column: is_internal BOOLEAN         ROS uses the service for itself
+-- column: round_trip_max_ns, is_internal
 -- brief: service_name, client, round_trip_median_most_ns, round_trip_p99_most_ns,
 --     round_trip_max_ns, runs, requests, answered, server, not_taken, not_answered, not_received
 SELECT
-    g.label_group,
-    s.service_name,
-    s.server,
-    s.client,
+    g.label_group, s.service_name, s.server, s.client,
     count(DISTINCT s.run) AS runs,
     sum(s.requests)::BIGINT AS requests,
     sum(s.answered)::BIGINT AS answered,

@@ -1,31 +1,23 @@
--- name: fleet.timers
 -- title: Whether timers keep their period, of many runs
 -- description: As the query timers says it of one run. Quantiles of runs cannot be added up: the
 --     largest of any timer stands for them.
 -- grain: one row per node, timer and group of runs
--- column: label_group BIGINT        Group of runs
--- column: node VARCHAR [node]       Node of the timer
--- column: callback VARCHAR [callback]  The timer, by its period
--- column: runs BIGINT               Runs that have it
+-- like: queries.timers, waits
+-- column: label_group, node, callback, runs
 -- column: count BIGINT              Calls
--- column: missed BIGINT             Calls that did not happen, since the one before was late by
---     whole periods
--- column: bunched BIGINT            Calls less than half a period after the one before
+-- column: missed, bunched
 -- column: jitter_median_most_ns BIGINT [ns]  Largest median of the jitter
 -- column: jitter_p99_most_ns BIGINT [ns]  Largest 99 % quantile of the jitter
--- column: jitter_max_ns BIGINT [ns]  Greatest jitter
+-- column: jitter_max_ns
 -- column: lateness_median_most_ns BIGINT [ns]  Largest median of the lateness
 -- column: lateness_p99_most_ns BIGINT [ns]  Largest 99 % quantile of the lateness
--- column: lateness_max_ns BIGINT [ns]  Greatest lateness
+-- column: lateness_max_ns
 -- column: unknown BIGINT            Of count, those whose due moment is not known
--- column: loss_affected BIGINT      Of count, those with a gap of the trace since the call before
--- column: is_internal BOOLEAN       Infrastructure of ROS
+-- column: loss_affected, is_internal
 -- brief: node, callback, count, missed, lateness_p99_most_ns, lateness_max_ns, jitter_p99_most_ns,
 --     runs, lateness_median_most_ns, bunched
 SELECT
-    g.label_group,
-    t.node,
-    t.callback,
+    g.label_group, t.node, t.callback,
     count(DISTINCT t.run) AS runs,
     sum(t.count)::BIGINT AS count,
     sum(t.missed)::BIGINT AS missed,

@@ -1,36 +1,23 @@
--- name: fleet.topics_delivery
 -- title: Messages delivered, dropped and lost by topic and receiver, of many runs
 -- description: As the query topics --measure delivery says it of one run. Counts are added, and the
---     shares are of
---     their sums.
+--     shares are of their sums.
 -- grain: one row per topic, receiving node and group of runs
--- column: label_group BIGINT        Group of runs
--- column: topic_name VARCHAR [topic]  Topic
--- column: subscriber VARCHAR [node]  Node that subscribes
--- column: runs BIGINT               Runs that have it
+-- like: queries.topics-delivery, topics_latency
+-- column: label_group, topic_name, subscriber, runs
 -- column: lossy_runs BIGINT         Of these, runs in which messages were dropped or lost
 -- column: published BIGINT          Messages published on the topic
--- column: delivered BIGINT          Of these, taken
--- column: dropped BIGINT            Of these, those that newer ones replaced in a full queue
--- column: lost BIGINT               Of these, lost on the way
+-- column: delivered, dropped, lost
 -- column: not_connected BIGINT      Of these, before or after the two were connected
--- column: cut_by_recording BIGINT   Of these, those that the end of the recording left untaken
--- column: unknown BIGINT            Of these, with an unknown fate
--- column: delivered_percent DOUBLE [%]  Share delivered, of those delivered, dropped or lost
--- column: lost_percent DOUBLE [%]   Share lost, of the same
+-- column: cut_by_recording, unknown, delivered_percent, lost_percent
 -- column: orphans BIGINT            Takes whose publication is not known
--- column: reasons VARCHAR           Why messages were not taken, with counts
--- column: orphan_reasons VARCHAR    Why publications are not known, with counts
--- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- column: reasons, orphan_reasons, is_internal
 -- brief: topic_name, subscriber, delivered, dropped, lost, delivered_percent, runs, lossy_runs,
 --     unknown, lost_percent, published, reasons, not_connected, cut_by_recording, orphans,
 --     orphan_reasons
 -- answer: delivered, dropped, lost, unknown
 WITH merged AS (
     SELECT
-        g.label_group,
-        d.topic_name,
-        d.subscriber,
+        g.label_group, d.topic_name, d.subscriber,
         count(DISTINCT d.run) AS runs,
         count(DISTINCT d.run) FILTER (WHERE d.dropped + d.lost > 0) AS lossy_runs,
         sum(d.published)::BIGINT AS published,
@@ -47,24 +34,11 @@ WITH merged AS (
     GROUP BY g.label_group, d.topic_name, d.subscriber
 )
 SELECT
-    m.label_group,
-    m.topic_name,
-    m.subscriber,
-    m.runs,
-    m.lossy_runs,
-    m.published,
-    m.delivered,
-    m.dropped,
-    m.lost,
-    m.not_connected,
-    m.cut_by_recording,
-    m.unknown,
+    m.label_group, m.topic_name, m.subscriber, m.runs, m.lossy_runs, m.published, m.delivered,
+    m.dropped, m.lost, m.not_connected, m.cut_by_recording, m.unknown,
     100.0::DOUBLE * m.delivered / nullif(m.delivered + m.dropped + m.lost, 0) AS delivered_percent,
     100.0::DOUBLE * m.lost / nullif(m.delivered + m.dropped + m.lost, 0) AS lost_percent,
-    m.orphans,
-    r.text AS reasons,
-    o.text AS orphan_reasons,
-    m.is_internal
+    m.orphans, r.text AS reasons, o.text AS orphan_reasons, m.is_internal
 FROM merged AS m
 LEFT JOIN reason_count AS r
     ON r.name = 'reasons' AND m.label_group = r.label_group

@@ -1,8 +1,6 @@
--- name: fleet.topics_latency
 -- title: Latency from publication to take by topic and receiver, of many runs
 -- description: As the query topics --measure latency says it of one run. Quantiles of several
---     subscriptions
---     are off by less than 1 %, means by less than 1 ns, all else is exact.
+--     subscriptions are off by less than 1 %, means by less than 1 ns, all else is exact.
 -- grain: one row per topic, receiving node and group of runs
 -- like: e2e_latency
 -- column: label_group BIGINT        Group of runs
@@ -19,9 +17,7 @@
 --     ambiguous, mean_ns, p99_ns, min_ns
 WITH merged AS (
     SELECT
-        g.label_group,
-        t.topic_name,
-        t.subscriber,
+        g.label_group, t.topic_name, t.subscriber,
         count(DISTINCT t.run) AS runs,
         sum(t.takes)::BIGINT AS takes,
         sum(t.linked)::BIGINT AS linked,
@@ -39,21 +35,13 @@ WITH merged AS (
     GROUP BY g.label_group, t.topic_name, t.subscriber
 )
 SELECT
-    m.label_group,
-    m.topic_name,
-    m.subscriber,
-    m.runs,
-    m.takes,
-    m.linked,
-    m.ambiguous,
-    m.negative,
+    m.label_group, m.topic_name, m.subscriber, m.runs, m.takes, m.linked, m.ambiguous, m.negative,
     m.min_ns,
     coalesce(m.median_ns, greatest(m.min_ns, least(m.max_ns, d.median_ns))) AS median_ns,
     m.mean_ns,
     coalesce(m.p95_ns, greatest(m.min_ns, least(m.max_ns, d.p95_ns))) AS p95_ns,
     coalesce(m.p99_ns, greatest(m.min_ns, least(m.max_ns, d.p99_ns))) AS p99_ns,
-    m.max_ns,
-    m.is_internal
+    m.max_ns, m.is_internal
 FROM merged AS m
 LEFT JOIN distributed AS d
     ON d.measure = 'transport_latency' AND m.label_group = d.label_group

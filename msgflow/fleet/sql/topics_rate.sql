@@ -1,26 +1,19 @@
--- name: fleet.topics_rate
 -- title: Publication rates and periods, of many runs
 -- description: As the query topics --measure rate says it of one run. The rate is that of all runs
 --     together, without the time between them. Medians and deviations of runs cannot be added up:
 --     the smallest and the largest median of any publisher stand for them.
 -- grain: one row per topic, publishing node and group of runs
--- column: label_group BIGINT        Group of runs
--- column: topic_name VARCHAR [topic]  Topic
--- column: publisher VARCHAR [node]  Node that published
--- column: runs BIGINT               Runs that have it
+-- like: queries.topics-rate, topics_latency
+-- column: label_group, topic_name, publisher, runs
 -- column: count BIGINT              Publications
--- column: rate_hz DOUBLE [Hz]       Publications per second
--- column: period_min_ns BIGINT [ns]     Shortest time from one publication to the next
+-- column: rate_hz, period_min_ns
 -- column: period_median_least_ns BIGINT [ns]  Smallest median of these times
 -- column: period_median_most_ns BIGINT [ns]  Largest median of these times
--- column: period_max_ns BIGINT [ns]     Longest time from one publication to the next
--- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- column: period_max_ns, is_internal
 -- brief: topic_name, publisher, rate_hz, period_median_least_ns, period_median_most_ns,
 --     period_max_ns, runs, count, period_min_ns
 SELECT
-    g.label_group,
-    p.topic_name,
-    p.publisher,
+    g.label_group, p.topic_name, p.publisher,
     count(DISTINCT p.run) AS runs,
     sum(p.count)::BIGINT AS count,
     CASE

@@ -1,4 +1,3 @@
--- name: fleet.worst
 -- title: The flows of a path that took longest, of all runs
 -- description: Flows that reached the end of the path, by their first arrival, with the recording
 --     that each is in.
@@ -29,15 +28,9 @@ wanted AS (
     WHERE path = $path OR NOT EXISTS (SELECT 1 FROM fitting WHERE path = $path)
 )
 SELECT
-    w.latency_ns,
-    r.name,
-    w.run,
+    w.latency_ns, r.name, w.run,
     list_transform(map_entries(r.labels), lambda entry: entry.key || '=' || entry.value) AS labels,
-    w.root_ns,
-    w.path,
-    r.source,
-    w.root_kind,
-    w.root_id,
+    w.root_ns, w.path, r.source, w.root_kind, w.root_id,
     r.database_part IS NOT NULL AS has_database
 FROM wanted AS w
 JOIN run AS r ON w.run = r.run

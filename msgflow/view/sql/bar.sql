@@ -1,4 +1,3 @@
--- name: bar
 -- description: What the timeline draws as a bar: callback instances, publications, takes, requests
 --     and responses of services, from sending to taking, what executor threads did, states of
 --     threads to the kernel, states of managed nodes, and, without a length, events of the user's own tracepoints and messages that
@@ -30,8 +29,7 @@ SELECT
         ELSE 8 * c.callback_id + 5
     END AS row_key,
     0::UTINYINT AS kind,
-    i.callback_instance_id AS id,
-    i.start_ns,
+    i.callback_instance_id AS id, i.start_ns,
     coalesce(i.end_ns, i.start_ns) AS end_ns,
     (coalesce(i.is_loss_affected, false)::UTINYINT + 2 * (i.end_ns IS NULL)::UTINYINT
         + 4 * i.is_intra_process::UTINYINT + 8 * (i.depth > 1)::UTINYINT)::UTINYINT AS flags
@@ -103,9 +101,7 @@ FROM main.user_event AS u
 LEFT JOIN main.callback_instance AS i ON u.callback_instance_id = i.callback_instance_id
 LEFT JOIN main.callback AS c ON i.callback_id = c.callback_id
 JOIN event_row AS r
-    ON u.process_id = r.process_id
-    AND c.node_id IS NOT DISTINCT FROM r.node_id
-    AND u.name = r.name
+    ON u.process_id = r.process_id AND c.node_id IS NOT DISTINCT FROM r.node_id AND u.name = r.name
 UNION ALL
 SELECT
     run_id, -4 * node_id - 1, CASE WHEN state = 'active' THEN 10 ELSE 11 END, -1, start_ns, end_ns, 0

@@ -1,5 +1,3 @@
--- name: callback
--- title: Callbacks and what triggers them
 -- description: The callbacks of a run, each with its subscription, timer or service.
 -- grain: one row per callback
 -- column: callback_id BIGINT  The callback

@@ -1,5 +1,3 @@
--- name: callback_point
--- title: A callback over time
 -- description: Instances of a callback by pieces of time, with the longest of each.
 -- grain: one row per piece of time in which an instance began
 -- param: callback BIGINT  The callback
@@ -11,9 +9,7 @@
 -- column: duration BIGINT [ns]  Longest duration
 -- column: callback_instance_id BIGINT  Instance with the longest duration; the first one if none was
 --     seen to end
-WITH extent AS (
-    SELECT ($end_ns - $start_ns) // $bins + 1 AS width
-)
+WITH extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width)
 SELECT
     $start_ns - $origin_ns + (i.start_ns - $start_ns) // e.width * e.width AS start_at,
     e.width AS length,

@@ -1,5 +1,3 @@
--- name: callback_slowest
--- title: Longest instances of a callback
 -- description: The instances of a callback that ran longest, as callbacks --each lists them.
 -- grain: one row per callback instance
 -- param: callback BIGINT  The callback
@@ -7,10 +5,7 @@
 -- column: start_at BIGINT [ns since origin]  When it began
 -- column: duration BIGINT [ns]  How long it ran
 -- column: callback_instance_id BIGINT  Identity of the instance
-SELECT
-    start_ns - $origin_ns AS start_at,
-    end_ns - start_ns AS duration,
-    callback_instance_id
+SELECT start_ns - $origin_ns AS start_at, end_ns - start_ns AS duration, callback_instance_id
 FROM main.callback_instance
 WHERE run_id = $run
     AND callback_id = $callback

@@ -1,5 +1,3 @@
--- name: critical_end
--- title: Of which flow the critical path is asked
 -- description: What the query critical-path is asked of a picked thing: the flow from the first
 --     message that led to it (of what a timer began, from the first that it led to) to the last
 --     take that it led to. Where it led to none, to the last take that led to it.

@@ -1,5 +1,3 @@
--- name: edge
--- title: Links between what a report holds
 -- description: Links of a run whose ends begin in a window, for a page without a database to follow
 --     flows by: the same as main.flow_both follows.
 -- grain: one row per link
@@ -8,9 +6,7 @@
 -- column: from_kind UTINYINT  Cause
 -- column: from_id BIGINT  Its identity
 -- column: link_kind VARCHAR  'transport', 'callback', 'service' or the kind of a causal link
-WITH held AS (
-    SELECT kind, id FROM segment WHERE kind < 5
-),
+WITH held AS (SELECT kind, id FROM segment WHERE kind < 5),
 code AS (
     SELECT unnest(
         ['callback_instance', 'publication', 'take', 'request', 'response']

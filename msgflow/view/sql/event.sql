@@ -1,5 +1,3 @@
--- name: event
--- title: Events of the user in a window
 -- description: Bars of the timeline for events of the user's own tracepoints, those inside of
 --     callback instances.
 -- grain: one row per event

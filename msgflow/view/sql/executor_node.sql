@@ -1,5 +1,3 @@
--- name: executor_node
--- title: Nodes of executors
 -- description: Nodes, and the executors that ran their callbacks.
 -- grain: one row per node and executor that ran a callback of it
 -- column: node VARCHAR  Full name of the node, or its process in brackets
@@ -18,11 +16,9 @@ member AS (
     GROUP BY thread_id
 )
 SELECT
-    l.node,
-    h.hostname AS host,
+    l.node, h.hostname AS host,
     printf('%s %d', coalesce(p.name, '?'), p.pid) AS process,
-    e.executor_id,
-    e.kind AS executor_kind,
+    e.executor_id, e.kind AS executor_kind,
     (SELECT count(*) FROM main.executor_thread AS x WHERE x.executor_id = e.executor_id)
         AS threads
 FROM ran AS r

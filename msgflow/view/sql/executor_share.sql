@@ -1,5 +1,3 @@
--- name: executor_share
--- title: What executor threads did over time
 -- description: What executor threads did (main.executor_activity) by pieces of time. Of threads
 --     whose executor tells nothing of itself, takes and callbacks alone are known.
 -- grain: one row per thread, piece of time and activity
@@ -9,9 +7,7 @@
 -- column: length BIGINT [ns]  Length of the piece
 -- column: activity VARCHAR  'wait', 'select', 'callback' (or a take, or a service) or 'blocked'
 -- column: busy BIGINT [ns]  Time of the piece with it
-WITH extent AS (
-    SELECT ($end_ns - $start_ns) // $bins + 1 AS width
-),
+WITH extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width),
 did AS (
     SELECT
         thread_id, start_ns, end_ns,
@@ -41,8 +37,7 @@ whole AS (
 SELECT
     thread_id,
     $start_ns - $origin_ns + bin * width AS start_at,
-    width AS length,
-    activity,
+    width AS length, activity,
     sum(least(end_at, (bin + 1) * width) - greatest(begin_at, bin * width))::BIGINT AS busy
 FROM whole
 GROUP BY thread_id, bin, width, activity

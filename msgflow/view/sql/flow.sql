@@ -1,5 +1,3 @@
--- name: flow
--- title: The flow of what was picked
 -- description: Everything that the picked thing caused, or was caused by, or both
 --     (main.flow_both), as bars, and the links between them.
 -- grain: one row per vertex of the flow and link that leads to it; one for a vertex without
@@ -44,8 +42,7 @@ vertex AS (
     JOIN code AS c ON r.kind = c.name
 ),
 drawn AS MATERIALIZED (
-    SELECT
-        v.name, v.kind, v.id, v.is_effect, v.is_cause, b.row_key, b.start_ns, b.end_ns, b.flags
+    SELECT v.name, v.kind, v.id, v.is_effect, v.is_cause, b.row_key, b.start_ns, b.end_ns, b.flags
     FROM vertex AS v
     JOIN bar AS b ON v.kind = b.kind AND v.id = b.id
 ),
@@ -64,17 +61,10 @@ link AS (
     SEMI JOIN near AS t ON l.to_kind = t.name AND l.to_id = t.id
 )
 SELECT
-    n.kind,
-    n.id,
-    n.row_key,
+    n.kind, n.id, n.row_key,
     n.start_ns - $origin_ns AS start_at,
     n.end_ns - n.start_ns AS length,
-    n.flags,
-    n.is_effect,
-    n.is_cause,
-    c.code AS from_kind,
-    l.from_id,
-    l.link_kind,
+    n.flags, n.is_effect, n.is_cause, c.code AS from_kind, l.from_id, l.link_kind,
     (SELECT count(*) FROM reached) AS vertex_count
 FROM near AS n
 LEFT JOIN link AS l ON n.name = l.to_kind AND n.id = l.to_id

@@ -1,5 +1,3 @@
--- name: gap
--- title: Gaps of the recording
 -- description: Where events are missing, by host.
 -- grain: one row per gap of a trace
 -- param: limit BIGINT {1..50000} = 20000  Most gaps, the longest

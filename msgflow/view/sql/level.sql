@@ -1,5 +1,3 @@
--- name: level
--- title: Bars of the timeline in a wide window
 -- description: What segments.sql gives for bins of some length, counted once for the whole run, put
 --     together to longer bins.
 -- grain: one row per bar, or per row of the timeline, kind and bin with shorter ones

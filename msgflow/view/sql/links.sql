@@ -1,5 +1,3 @@
--- name: links
--- title: Arrows of the timeline
 -- description: Links that overlap a window: messages from the end of their publication to the take,
 --     publications in the callback instance they came from, and indirect links from the end of the
 --     callback instance with the input to the publication. Doubtful effects of a take are left out.
@@ -22,8 +20,7 @@ WITH message AS (
         0::UTINYINT AS link_kind,
         8 * b.publisher_id + 4 AS from_row,
         8 * t.subscription_id + 1 AS to_row,
-        b.end_ns AS from_ns,
-        t.taken_ns AS to_ns,
+        b.end_ns AS from_ns, t.taken_ns AS to_ns,
         coalesce(l.is_loss_affected, false) AS is_loss_affected
     FROM main.link_transport AS l
     JOIN main.publication AS b ON l.publication_id = b.publication_id

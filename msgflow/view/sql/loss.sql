@@ -1,5 +1,3 @@
--- name: loss
--- title: Messages that were not taken, and takes without a publication, by reason
 -- description: What `msgflow query topics --measure unmatched` lists one by one, counted by topic,
 --     receiving node and reason.
 -- grain: one row per topic, receiving node, status and reason
@@ -22,8 +20,7 @@ WITH missing AS (
 SELECT
     s.topic_name AS topic,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
-    m.status,
-    m.reason,
+    m.status, m.reason,
     count(*) AS count,
     min(m.at_ns) - $origin_ns AS first_at,
     max(m.at_ns) - $origin_ns AS last_at,

@@ -1,5 +1,3 @@
--- name: loss_point
--- title: Messages that were not taken, and takes without a publication, over time
 -- description: What `msgflow query topics --measure unmatched` lists one by one, counted by pieces
 --     of time, topic and reason.
 -- grain: one row per piece of time, topic and reason
@@ -16,15 +14,10 @@ WITH missing AS (
     FROM missing_side
     WHERE run_id = $run AND at_ns >= $start_ns AND at_ns < $end_ns
 ),
-extent AS (
-    SELECT ($end_ns - $start_ns) // $bins + 1 AS width
-)
+extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width)
 SELECT
     $start_ns - $origin_ns + (m.at_ns - $start_ns) // e.width * e.width AS start_at,
-    e.width AS length,
-    s.topic_name AS topic,
-    m.status,
-    m.reason,
+    e.width AS length, s.topic_name AS topic, m.status, m.reason,
     count(*) AS count,
     coalesce(s.is_internal, false) AS is_internal
 FROM missing AS m

@@ -1,4 +1,3 @@
--- name: missing_side
 -- description: Messages that a subscription did not take, and takes whose publication is not known.
 -- grain: one row per publication and subscription without a take, or take without a publication
 -- kind: inline
@@ -18,7 +17,6 @@ JOIN main.publication AS b ON d.publication_id = b.publication_id
 JOIN main.subscription AS s ON d.subscription_id = s.subscription_id
 WHERE d.status <> 'delivered'
 UNION ALL
-SELECT
-    o.run_id, t.taken_ns, 'take', o.take_id, o.subscription_id, t.process_id, 'orphan', o.reason
+SELECT o.run_id, t.taken_ns, 'take', o.take_id, o.subscription_id, t.process_id, 'orphan', o.reason
 FROM main.stat_orphan AS o
 JOIN main.take AS t ON o.take_id = t.take_id

@@ -1,5 +1,3 @@
--- name: neighbour
--- title: The next or previous of its kind
 -- description: The bar on the same row of the timeline that begins next, or before.
 -- grain: one row per bar found
 -- param: row BIGINT  Row of the timeline

@@ -1,5 +1,3 @@
--- name: path
--- title: Paths by number
 -- description: The paths that e2e-latency and path-breakdown show, with the objects on them.
 -- grain: one row per path
 -- column: path_id BIGINT  Number of the path

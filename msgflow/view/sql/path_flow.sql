@@ -1,5 +1,3 @@
--- name: path_flow
--- title: Flows of all paths
 -- description: The flows that e2e-latency counts: the first arrival of each root, or why there is
 --     none. Kept by the page for its pictures of single paths.
 -- grain: one row per path and root
@@ -16,8 +14,6 @@
 SELECT
     path_id, root_kind, root_id, root_ns - $origin_ns AS root_at, take_id, latency_ns AS latency,
     status, is_loss_affected
-FROM main.end_to_end(
-    [$run], NULL, NULL, 'callback_start', 'callback_end', $start_ns, $end_ns
-)
+FROM main.end_to_end([$run], NULL, NULL, 'callback_start', 'callback_end', $start_ns, $end_ns)
 WHERE is_first IS NOT false
 ORDER BY path_id, root_at, root_kind, root_id

@@ -1,5 +1,3 @@
--- name: path_histogram
--- title: Histogram of a path
 -- description: How many flows of a path took how long, in bins of one width.
 -- grain: one row per bin with flows
 -- param: path BIGINT  Number of the path

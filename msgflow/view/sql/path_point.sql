@@ -1,5 +1,3 @@
--- name: path_point
--- title: Latency of a path over time
 -- description: Flows of a path one by one, or, where they are many, the slowest of each piece of
 --     time with the median of the piece.
 -- grain: one row per flow, or per piece of time with flows

@@ -1,5 +1,3 @@
--- name: path_share
--- title: Latency by share of the flows
 -- description: The distribution of the latency of a path: latencies that occurred, such that a
 --     share of the flows took no longer.
 -- grain: one row per share

@@ -1,5 +1,3 @@
--- name: path_slowest
--- title: Slowest flows
 -- description: The slowest flows of a path, or of every path.
 -- grain: one row per flow
 -- param: path BIGINT = NULL  Number of the path; every one when NULL

@@ -1,5 +1,3 @@
--- name: place
--- title: Run of one thing
 -- description: The run that a publication, take, callback instance, request or response is in.
 -- grain: one row, none for an identity that nothing has
 -- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
@@ -15,5 +13,4 @@ WHERE $kind = 'callback_instance' AND callback_instance_id = $id
 UNION ALL
 SELECT run_id FROM main.request WHERE $kind = 'request' AND request_id = $id
 UNION ALL
-SELECT run_id FROM main.response WHERE $kind = 'response' AND response_id = $id
-ORDER BY run_id
+SELECT run_id FROM main.response WHERE $kind = 'response' AND response_id = $id ORDER BY run_id

@@ -1,5 +1,3 @@
--- name: rate
--- title: How much happened over time
 -- description: Publications, takes and callbacks that began, by pieces of time: the curve on which
 --     a window of time is chosen.
 -- grain: one row per piece of time in which something began
@@ -14,9 +12,7 @@ WITH began AS (
     UNION ALL
     SELECT start_ns FROM main.callback_instance WHERE run_id = $run
 ),
-extent AS (
-    SELECT ($end_ns - $start_ns) // $bins + 1 AS width
-)
+extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width)
 SELECT
     $start_ns - $origin_ns + (b.at_ns - $start_ns) // e.width * e.width AS start_at,
     e.width AS length,

@@ -1,5 +1,3 @@
--- name: row
--- title: Rows of the timeline
 -- description: Everything that has a row in the timeline, in its order: by host, process and node;
 --     there the states of a managed node, timers, subscriptions, services, clients, publishers and
 --     events of the user, and below each process the threads of its executors. Where the kernel was

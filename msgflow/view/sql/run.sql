@@ -1,5 +1,3 @@
--- name: run
--- title: Runs to choose from
 -- description: The runs of the database, and how much of the timeline each has.
 -- grain: one row per run
 -- column: run_id BIGINT  Identity of the run
@@ -10,8 +8,7 @@
 -- column: host_count BIGINT  Machines and containers
 -- column: msgflow_version VARCHAR  Version that read it
 SELECT
-    r.run_id,
-    r.name,
+    r.run_id, r.name,
     r.start_ns::VARCHAR AS start_text,
     r.end_ns - r.start_ns AS length,
     (SELECT sum(event_count)::BIGINT FROM main.trace AS t WHERE t.run_id = r.run_id)

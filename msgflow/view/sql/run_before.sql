@@ -1,20 +1,11 @@
--- name: run_before
--- title: Run to compare with
 -- description: The run of the same system that was recorded last before a run. Two runs are of one
 --     system if at least half of the nodes of both are in both.
 -- grain: one row, none where there is no such run
 -- column: run_id BIGINT  The run before it
-WITH known AS (
-    SELECT DISTINCT run_id, full_name FROM main.node WHERE full_name IS NOT NULL
-),
-own AS (
-    SELECT full_name FROM known WHERE run_id = $run
-),
+WITH known AS (SELECT DISTINCT run_id, full_name FROM main.node WHERE full_name IS NOT NULL),
+own AS (SELECT full_name FROM known WHERE run_id = $run),
 other AS (
-    SELECT
-        k.run_id,
-        count(*) AS nodes,
-        count(o.full_name) AS common
+    SELECT k.run_id, count(*) AS nodes, count(o.full_name) AS common
     FROM known AS k
     LEFT JOIN own AS o ON k.full_name = o.full_name
     WHERE k.run_id <> $run

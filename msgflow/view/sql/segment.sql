@@ -1,4 +1,3 @@
--- name: segment
 -- description: Bars of one run, as far as they overlap the window, and the pauses of events
 --     executors in it.
 -- grain: one row per bar

@@ -1,5 +1,3 @@
--- name: segment_count
--- title: How many bars a window has
 -- description: Number of bars in a window, which decides whether they are drawn one by one.
 -- grain: one row per window
 -- column: count BIGINT  Bars

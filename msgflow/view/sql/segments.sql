@@ -1,5 +1,3 @@
--- name: segments
--- title: Bars of the timeline
 -- description: What the timeline draws in a window. With a bin, bars shorter than it are counted
 --     per row, kind and bin, and only longer ones come one by one.
 -- grain: one row per bar, or per row of the timeline, kind and bin with shorter ones
@@ -9,9 +7,7 @@
 -- column: flags UTINYINT  As in segment.sql
 -- column: count, busy
 SELECT
-    row_key,
-    kind,
-    id,
+    row_key, kind, id,
     start_ns - $origin_ns AS start_at,
     end_ns - start_ns AS length,
     flags,
@@ -21,9 +17,7 @@ FROM segment
 WHERE $bin_ns IS NULL OR end_ns - start_ns >= $bin_ns
 UNION ALL
 SELECT
-    row_key,
-    kind,
-    NULL,
+    row_key, kind, NULL,
     $bin_ns * ((start_ns - $origin_ns) // $bin_ns) AS start_at,
     $bin_ns,
     bit_or(flags),

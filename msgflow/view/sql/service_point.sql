@@ -1,5 +1,3 @@
--- name: service_point
--- title: Calls of a service over time
 -- description: Calls of one client of a service by pieces of time, with the longest of each.
 -- grain: one row per piece of time in which a call began
 -- param: client BIGINT = NULL  Client that called; NULL: not known
@@ -11,9 +9,7 @@
 -- column: median BIGINT [ns]  Median round trip
 -- column: duration BIGINT [ns]  Longest round trip
 -- column: request_id BIGINT  Request with the longest round trip; without an answer, the first request
-WITH extent AS (
-    SELECT ($end_ns - $start_ns) // $bins + 1 AS width
-),
+WITH extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width),
 call AS (
     SELECT
         q.request_id,

@@ -1,5 +1,3 @@
--- name: service_slowest
--- title: Longest calls of a service
 -- description: The calls of one client of a service with the longest round trip.
 -- grain: one row per request
 -- param: client BIGINT = NULL  Client that called; NULL: not known
@@ -7,10 +5,7 @@
 -- column: start_at BIGINT [ns since origin]  When the request was sent
 -- column: duration BIGINT [ns]  Round trip
 -- column: request_id BIGINT  Identity of the request
-SELECT
-    q.sent_ns - $origin_ns AS start_at,
-    min(r.taken_ns) - q.sent_ns AS duration,
-    q.request_id
+SELECT q.sent_ns - $origin_ns AS start_at, min(r.taken_ns) - q.sent_ns AS duration, q.request_id
 FROM main.request AS q
 JOIN main.response AS r ON q.request_id = r.request_id
 WHERE q.run_id = $run

@@ -1,4 +1,3 @@
--- name: thread_bar
 -- description: What the kernel did with threads, as bars of the timeline: the states of each thread,
 --     and on each core what ran there, and who lost it to whom. Of other processes nothing but what
 --     took a core from a thread of a ROS process is known.
@@ -31,8 +30,7 @@ SELECT
             THEN coalesce(2 * waker_thread_id, 2 * waker_other_thread_id + 1) END,
         -1
     ) AS id,
-    start_ns,
-    end_ns,
+    start_ns, end_ns,
     (is_loss_affected::UTINYINT + CASE waker_kind
         WHEN 'timer' THEN 16
         WHEN 'interrupt' THEN 32

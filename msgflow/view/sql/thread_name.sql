@@ -1,5 +1,3 @@
--- name: thread_name
--- title: Names of threads that the kernel saw
 -- description: What bars of thread_bar.sql call by number. Without kernel traces there are none.
 -- grain: one row per thread with known states, and per other thread
 -- column: id BIGINT  Twice the thread_id; of a thread of another process one more than twice its

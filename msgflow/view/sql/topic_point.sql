@@ -1,5 +1,3 @@
--- name: topic_point
--- title: A topic over time
 -- description: Messages of a topic by pieces of time: how many were published and taken, how long
 --     the takes took from publication to take, and the slowest of them.
 -- grain: one row per piece of time with a publication or a take
@@ -12,9 +10,7 @@
 -- column: median BIGINT [ns]  Median latency of its takes; NULL: of none it is known
 -- column: latency BIGINT [ns]  Longest latency of its takes
 -- column: take_id BIGINT  Take with the longest latency
-WITH extent AS (
-    SELECT ($end_ns - $start_ns) // $bins + 1 AS width
-),
+WITH extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width),
 happened AS (
     SELECT b.start_ns AS at_ns, false AS is_take, NULL::BIGINT AS take_id, NULL::BIGINT AS latency
     FROM main.publication AS b

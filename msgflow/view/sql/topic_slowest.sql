@@ -1,5 +1,3 @@
--- name: topic_slowest
--- title: Slowest messages of a topic
 -- description: The takes of a topic with the longest latency from publication to take.
 -- grain: one row per take
 -- param: topic VARCHAR = NULL  Topic; NULL: that without a known name
@@ -11,8 +9,7 @@
 SELECT
     t.taken_ns - $origin_ns AS taken_at,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
-    l.latency_ns AS latency,
-    t.take_id
+    l.latency_ns AS latency, t.take_id
 FROM main.take AS t
 JOIN main.link_transport AS l ON t.take_id = l.take_id
 JOIN main.subscription AS s ON t.subscription_id = s.subscription_id

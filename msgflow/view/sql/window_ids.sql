@@ -1,5 +1,3 @@
--- name: window_ids
--- title: Identities in a window
 -- description: Bounds of the identities of what a window shows. Identities follow time on the clock
 --     of each host, so that links.sql reads little beyond them.
 -- grain: one row
@@ -8,8 +6,7 @@
 -- column: first_publication BIGINT  Least of a publication that ends in the window or after it
 -- column: last_publication BIGINT  Greatest of one that begins in the window or before it
 -- column: last_instance BIGINT  Greatest of a callback instance that begins in the window or before
-SELECT
-    t.first_take, t.last_take, b.first_publication, b.last_publication, i.last_instance
+SELECT t.first_take, t.last_take, b.first_publication, b.last_publication, i.last_instance
 FROM (
     SELECT
         min(take_id) FILTER (WHERE taken_ns >= $start_ns) AS first_take,

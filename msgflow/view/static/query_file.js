@@ -2,8 +2,8 @@
 
 const UNIT = / \[([^\]]+)\]$/;
 
-// Options: name, title; described: the rows of DESCRIBE, with labels; words: what the views say.
-export function queryFile(text, { name, title }, described, words) {
+// Options: title; described: the rows of DESCRIBE, with labels; words: what the views say.
+export function queryFile(text, { title }, described, words) {
   const column = (label) => described.columns.find((one) => one.label === label).exact;
   const [names, types] = [column("column_name"), column("column_type")];
   const known = new Map();
@@ -22,7 +22,6 @@ export function queryFile(text, { name, title }, described, words) {
   const line = (value) => value.replaceAll(/\s+/g, " ").trim() || "…";
   const odd = names.filter((one) => !/^[A-Za-z_]\w*$/.test(one));
   return [
-    `-- name: ${line(name)}`,
     `-- title: ${line(title)}`,
     `-- description: ${line(title)}.`,
     "-- grain: one row per …",

@@ -349,10 +349,8 @@ export class SqlPage {
     const described = await this.ask(`DESCRIBE ${text}`);
     if (!described) return;
     const shown = h("pre", { className: "plan query-file", tabIndex: 0 });
-    const file = () =>
-      queryFile(text, { name: name.value, title: title.value }, described, this.words);
+    const file = () => queryFile(text, { title: title.value }, described, this.words);
     const fill = () => clear(shown, file());
-    name.addEventListener("input", fill);
     title.addEventListener("input", fill);
     fill();
     clear(

@@ -1,4 +1,3 @@
--- name: finding.delivery_is_complete
 -- title: Messages are counted twice, or not at all
 -- description: Every take has a publication or a reason, and every message was taken by each
 --     subscription of its topic or has a reason: published times subscriptions is what was
@@ -52,8 +51,7 @@ not_judged AS (
     SELECT p.run_id, p.topic_name, count(*) AS number
     FROM derive.copied_pair AS c
     JOIN publisher AS p ON c.publisher_id = p.publisher_id
-    JOIN subscription AS s
-        ON c.subscription_id = s.subscription_id AND p.topic_name = s.topic_name
+    JOIN subscription AS s ON c.subscription_id = s.subscription_id AND p.topic_name = s.topic_name
     JOIN store.publication AS b ON c.publisher_id = b.publisher_id
     ANTI JOIN (SELECT * FROM store.link_transport WHERE is_copy IS NOT TRUE) AS l
         ON b.publication_id = l.publication_id AND c.subscription_id = l.subscription_id
@@ -65,19 +63,13 @@ undelivered AS (
     JOIN subscription AS s ON u.subscription_id = s.subscription_id
     GROUP BY s.run_id, s.topic_name
 ),
-taken AS (
-    SELECT run_id, count(*) AS number FROM store.take GROUP BY run_id
-),
+taken AS (SELECT run_id, count(*) AS number FROM store.take GROUP BY run_id),
 linked AS (
     SELECT run_id, count(DISTINCT take_id) AS number FROM store.link_transport GROUP BY run_id
 ),
-orphan AS (
-    SELECT run_id, count(DISTINCT take_id) AS number FROM store.orphan_take GROUP BY run_id
-)
+orphan AS (SELECT run_id, count(DISTINCT take_id) AS number FROM store.orphan_take GROUP BY run_id)
 SELECT
-    b.run_id,
-    b.topic_name AS subject,
-    1 AS count,
+    b.run_id, b.topic_name AS subject, 1 AS count,
     printf(
         '%d messages for subscriptions; %d delivered, or with a reason',
         b.number * s.number - coalesce(n.number, 0),

@@ -1,4 +1,3 @@
--- name: finding.identity_is_unique
 -- title: Two rows have one identity
 -- description: Publications, takes, callback instances, requests, responses and events of the user
 --     have an identity of their own.
@@ -12,25 +11,16 @@ WITH repeated AS (
     GROUP BY run_id, publication_id
     HAVING count(*) > 1
     UNION ALL
-    SELECT run_id, 'take'
-    FROM store.take
-    GROUP BY run_id, take_id
-    HAVING count(*) > 1
+    SELECT run_id, 'take' FROM store.take GROUP BY run_id, take_id HAVING count(*) > 1
     UNION ALL
     SELECT run_id, 'callback_instance'
     FROM store.callback_instance
     GROUP BY run_id, callback_instance_id
     HAVING count(*) > 1
     UNION ALL
-    SELECT run_id, 'request'
-    FROM store.request
-    GROUP BY run_id, request_id
-    HAVING count(*) > 1
+    SELECT run_id, 'request' FROM store.request GROUP BY run_id, request_id HAVING count(*) > 1
     UNION ALL
-    SELECT run_id, 'response'
-    FROM store.response
-    GROUP BY run_id, response_id
-    HAVING count(*) > 1
+    SELECT run_id, 'response' FROM store.response GROUP BY run_id, response_id HAVING count(*) > 1
     UNION ALL
     SELECT run_id, 'user_event'
     FROM store.user_event

@@ -1,4 +1,3 @@
--- name: finding.interval_is_ordered
 -- title: An interval ends before it begins
 -- description: Nothing ends before it begins.
 -- cause: A mistake in msgflow, or input that it misunderstands.

@@ -1,7 +1,5 @@
--- name: finding.vocabulary_is_closed
 -- title: A word is not of the vocabulary
--- description: Kinds, methods, states, reasons and names of findings are words of the
---     vocabulary.
+-- description: Kinds, methods, states, reasons and names of findings are words of the vocabulary.
 -- cause: A mistake in msgflow, or input that it misunderstands.
 -- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per word that is not
@@ -86,5 +84,4 @@ WITH foreign_word AS (
     FROM store.finding
     WHERE name NOT IN (SELECT name FROM derive.finding_kind)
 )
-SELECT run_id, place AS subject, 1 AS count, printf('the word %s', word) AS detail
-FROM foreign_word
+SELECT run_id, place AS subject, 1 AS count, printf('the word %s', word) AS detail FROM foreign_word

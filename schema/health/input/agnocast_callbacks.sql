@@ -1,4 +1,3 @@
--- name: finding.agnocast_callbacks
 -- title: Callbacks of Agnocast, whose executors record no events
 -- description: Messages and timers of Agnocast led to callbacks. They are followed as those of ROS
 --     2 are. But what threads of Agnocast did between callbacks is not known: they have no executor

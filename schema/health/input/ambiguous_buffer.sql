@@ -1,4 +1,3 @@
--- name: finding.ambiguous_buffer
 -- title: Ring buffers without a known subscription
 -- description: The subscription that a ring buffer of intra-process messages belongs to is not
 --     known.

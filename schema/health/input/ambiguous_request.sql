@@ -1,4 +1,3 @@
--- name: finding.ambiguous_request
 -- title: Requests that several calls could have sent
 -- description: Requests were taken for which several calls of the client have the same number. They
 --     are left without a sender.

@@ -1,4 +1,3 @@
--- name: finding.clock_offsets_differ
 -- title: Clock offsets of one boot differ
 -- description: Traces of one boot count from different times. All were brought to the time of the
 --     first that is not the kernel's.

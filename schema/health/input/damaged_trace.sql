@@ -1,4 +1,3 @@
--- name: finding.damaged_trace
 -- title: Files of the trace are damaged
 -- description: Parts of the files could not be read: packets that are cut off, or bytes that make
 --     no sense. Everything else was kept.

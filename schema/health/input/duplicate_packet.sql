@@ -1,4 +1,3 @@
--- name: finding.duplicate_packet
 -- title: Packets that several traces hold
 -- description: Packets are in several of the given traces. Each was read once.
 -- cause: A recording was given twice, as when snapshots or copies of it overlap.

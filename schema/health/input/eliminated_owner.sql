@@ -1,4 +1,3 @@
--- name: finding.eliminated_owner
 -- title: Callbacks attributed by elimination
 -- description: Timers and services that callbacks belong to were deduced from how executors ran
 --     them.

@@ -1,4 +1,3 @@
--- name: finding.empty_trace
 -- title: A trace is empty
 -- description: The trace has metadata, but no events, and no other part of its recording was given.
 --     What its host or process did is not known.
@@ -10,10 +9,7 @@
 -- grain: one row per trace
 -- severity: warning
 -- when: staging.trace WHERE event_count = 0
-SELECT
-    trace_id,
-    1 AS count,
-    'no event was recorded' AS detail
+SELECT trace_id, 1 AS count, 'no event was recorded' AS detail
 FROM staging.trace
 -- A chunk of a recording may well be empty, and of a copy nothing is read.
 WHERE event_count = 0

@@ -1,4 +1,3 @@
--- name: finding.equal_process_ids
 -- title: Processes had equal ids at one time
 -- description: Processes had the same ids at the same time. They are told apart by their names, or
 --     by the sessions that recorded them. A thread with a name of its own, which no main thread

@@ -1,4 +1,3 @@
--- name: finding.executor_events_left_out
 -- title: Executors without the events that delimit their states
 -- description: An executor says that it waits for work, looks for what is ready, and executes. The
 --     recording has not all of these, so nothing shows when its threads waited, and their states
@@ -10,8 +9,7 @@
 -- severity: warning
 -- when: staging.executor_undelimited, staging.executor_named
 WITH left_out AS (
-    SELECT process_id, thread_id
-    FROM staging.executor_undelimited
+    SELECT process_id, thread_id FROM staging.executor_undelimited
     UNION
     -- CARET names the kind of the executor. These kinds have events.
     SELECT p.process_id, p.thread_id

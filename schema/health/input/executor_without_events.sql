@@ -1,4 +1,3 @@
--- name: finding.executor_without_events
 -- title: An executor that records no events
 -- description: Threads ran callbacks one after the other, and no event of an executor, although
 --     these events were enabled. What the threads did between callbacks is not known: they have no
@@ -14,9 +13,7 @@
 -- severity: warning
 -- when: staging.callback_pair WHERE thread_id NOT IN (SELECT thread_id FROM staging.executor_first)
 WITH enabled AS (
-    SELECT trace_index
-    FROM staging.declared
-    WHERE name = 'ros2:rclcpp_executor_get_next_ready'
+    SELECT trace_index FROM staging.declared WHERE name = 'ros2:rclcpp_executor_get_next_ready'
 ),
 silent AS (
     SELECT p.process_id, p.thread_id, count(*) AS number

@@ -1,4 +1,3 @@
--- name: finding.ignored_events
 -- title: Events were left out on request
 -- description: The run was ingested without some of the events that its traces hold. What they show
 --     is missing from all results.

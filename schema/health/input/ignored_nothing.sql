@@ -1,4 +1,3 @@
--- name: finding.ignored_nothing
 -- title: Patterns that match no event
 -- description: Patterns of --ignore match no event that the traces hold.
 -- cause: The pattern is misspelt, or such events were not recorded.

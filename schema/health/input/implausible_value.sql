@@ -1,4 +1,3 @@
--- name: finding.implausible_value
 -- title: Values that make no sense
 -- description: Values cannot be times or names. They were left out, their events kept.
 -- cause: The recording machine lost power or space, the session was never stopped, or the files

@@ -1,4 +1,3 @@
--- name: finding.inferred_object
 -- title: Objects were not seen to be created
 -- description: Nodes, publishers, subscriptions, timers, callbacks, clients or services were used
 --     whose creation is not in the trace. What they are called is not known, or deduced. Publishers

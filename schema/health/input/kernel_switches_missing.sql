@@ -1,4 +1,3 @@
--- name: finding.kernel_switches_missing
 -- title: The kernel trace lacks switches
 -- description: A switch names another thread than the switch before it put on the CPU. What ran in
 --     between is not known. A thread that leaves the CPU then had it at least since its first

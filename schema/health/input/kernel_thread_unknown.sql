@@ -1,4 +1,3 @@
--- name: finding.kernel_thread_unknown
 -- title: Threads are not known to the kernel trace
 -- description: Which of the kernel's threads these threads of ROS processes are is not known. There
 --     are no states of them.

@@ -1,4 +1,3 @@
--- name: finding.kernel_trace_not_joined
 -- title: A kernel trace does not fit the ROS events
 -- description: At most events of ROS processes, the kernel trace says that another thread ran on
 --     their CPU. It is of another clock or machine, so that nothing is said of scheduling.

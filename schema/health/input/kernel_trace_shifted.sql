@@ -1,4 +1,3 @@
--- name: finding.kernel_trace_shifted
 -- title: A kernel trace of another epoch was shifted
 -- description: The kernel trace names no clock of a ROS process. Shifted so that both count from
 --     the origin of one clock, it agrees with the events of ROS processes.

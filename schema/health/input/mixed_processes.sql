@@ -1,4 +1,3 @@
--- name: finding.mixed_processes
 -- title: Processes with equal ids cannot be told apart
 -- description: Several processes have the same ids and names, and their events are mixed. A thread
 --     was on two CPUs at one moment. Or Fast DDS made the GIDs of publishers and subscriptions in

@@ -1,4 +1,3 @@
--- name: finding.network_packets_unused
 -- title: Network packets that clocks are not brought together by
 -- description: Packets of the network were recorded whose two ends are not known.
 -- cause: They look like others, were repeated, or went to or came from hosts that are not traced.

@@ -1,4 +1,3 @@
--- name: finding.no_network_packets
 -- title: A kernel trace without network packets
 -- description: The trace of a kernel has no packets of the network, which would help to bring the
 --     clocks of hosts together.

@@ -1,9 +1,7 @@
--- name: finding.open_callback
 -- title: Callback instances without an end
 -- description: Callback instances whose end is not in the trace. Their durations are not known.
 -- cause: The trace or the process ended, a callback threw, or events were lost.
--- cure: None needed for the last one of a thread. The finding unbalanced_callbacks has the
---     others.
+-- cure: None needed for the last one of a thread. The finding unbalanced_callbacks has the others.
 -- grain: one row per trace
 -- severity: info
 -- when: staging.callback_pair WHERE end_ns IS NULL

@@ -1,4 +1,3 @@
--- name: finding.overlapping_traces
 -- title: Two traces hold the same events
 -- description: Threads were recorded twice at the same time, by two sessions. Where both hold the
 --     same events, they were read from one session only: the one with more events of the thread.

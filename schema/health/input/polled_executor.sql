@@ -1,4 +1,3 @@
--- name: finding.polled_executor
 -- title: An executor that a loop polls
 -- description: Threads ask their executor for work at times of their own. What such a thread does
 --     between two polls looks like 'process', the state of looking for what is ready, though it may

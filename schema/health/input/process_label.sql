@@ -1,4 +1,3 @@
--- name: finding.process_label
 -- kind: inline
 -- description: How processes are named in details.
 -- grain: one row per process

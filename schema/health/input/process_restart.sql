@@ -1,4 +1,3 @@
--- name: finding.process_restart
 -- title: Process ids that were used again
 -- description: New processes have the ids of earlier ones. Each is a process of its own in the
 --     database.

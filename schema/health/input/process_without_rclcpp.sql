@@ -1,4 +1,3 @@
--- name: finding.process_without_rclcpp
 -- title: A process that does not use rclcpp
 -- description: The process was seen to create nodes and to publish through rcl, and has no event
 --     of rclcpp, although these were enabled. So there are no callbacks, durations or executor
@@ -14,9 +13,7 @@
 -- severity: warning
 -- when: staging.process WHERE process_id NOT IN (SELECT process_id FROM staging.callback)
 --     OR python_version IS NOT NULL
-WITH enabled AS (
-    SELECT trace_index FROM staging.declared WHERE name = 'ros2:callback_start'
-),
+WITH enabled AS (SELECT trace_index FROM staging.declared WHERE name = 'ros2:callback_start'),
 rclcpp AS (
     SELECT process_id
     FROM staging.callback
@@ -40,9 +37,7 @@ sent AS (
     ANTI JOIN rclcpp AS r ON p.process_id = r.process_id
     GROUP BY p.process_id
 ),
-timed AS (
-    SELECT process_id, count(*) AS number FROM staging.timer GROUP BY process_id
-),
+timed AS (SELECT process_id, count(*) AS number FROM staging.timer GROUP BY process_id),
 -- One of rclcpp that was there before the recording may only have logged. Of rclpy all processes
 -- have one name, so that only their nodes tell them apart.
 named AS (

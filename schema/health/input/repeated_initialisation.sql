@@ -1,4 +1,3 @@
--- name: finding.repeated_initialisation
 -- title: Objects that were initialised again
 -- description: A publisher or subscription got the handle of an earlier one of the same topic.
 --     The later one counts from then on. Not counted: publishers of /rosout, all of

@@ -1,4 +1,3 @@
--- name: finding.repeated_packet
 -- title: Packets that one trace holds twice
 -- description: Packets are in a trace twice. Each was read once.
 -- cause: A stream file was copied beside itself.

@@ -1,4 +1,3 @@
--- name: finding.samples_incomplete
 -- title: Samples do not show all functions
 -- description: For a part of the samples it is not known which function ran, or what called it.
 -- cause: A file without symbols; or code that keeps no frame pointers, such as Python before 3.12.
@@ -24,9 +23,7 @@ counted AS (
         mode(file) FILTER (WHERE is_unnamed) AS unnamed_file
     FROM sample
 )
-SELECT
-    cut AS count,
-    printf('%d of %d samples do not show all callers', cut, samples) AS detail
+SELECT cut AS count, printf('%d of %d samples do not show all callers', cut, samples) AS detail
 FROM counted
 WHERE cut >= 0.1 * greatest(samples, 1)
 UNION ALL

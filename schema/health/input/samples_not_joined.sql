@@ -1,4 +1,3 @@
--- name: finding.samples_not_joined
 -- title: Samples of functions do not fit the ROS events
 -- description: Nothing is said of these samples, since their times or processes have no match.
 -- cause: perf recorded without -k CLOCK_MONOTONIC, on another machine, or no process of the

@@ -1,4 +1,3 @@
--- name: finding.unknown_annotation_handle
 -- title: Declared links of unknown objects
 -- description: Inputs or outputs of declared indirect links are not known subscriptions or
 --     publishers. They lead nowhere.

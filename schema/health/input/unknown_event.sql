@@ -1,4 +1,3 @@
--- name: finding.unknown_event
 -- title: Events that are not in the catalogue
 -- description: Events of names that say nothing about ROS 2. They were not loaded.
 -- cause: The session had events of other programs or of the kernel enabled, or those of another

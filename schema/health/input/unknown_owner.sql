@@ -1,4 +1,3 @@
--- name: finding.unknown_owner
 -- title: Callbacks without a known owner
 -- description: The timer, service or subscription of callbacks that ran is not known.
 -- cause: The session was started after the nodes, or the events of initialisation were not enabled
@@ -15,6 +14,5 @@ SELECT
     || string_agg(DISTINCT l.label, ', ' ORDER BY l.label) AS detail
 FROM staging.callback AS c
 JOIN process_label AS l ON c.process_id = l.process_id
-WHERE c.kind = 'unknown'
-    AND c.callback_id IN (SELECT callback_id FROM staging.callback_number)
+WHERE c.kind = 'unknown' AND c.callback_id IN (SELECT callback_id FROM staging.callback_number)
 HAVING count(*) > 0

@@ -1,4 +1,3 @@
--- name: finding.unmatched_callback_end
 -- title: Ends of callbacks without a start
 -- description: Callbacks ended, but their start is not in the trace. They are left out.
 -- cause: Tracing started inside a callback, or events were lost.

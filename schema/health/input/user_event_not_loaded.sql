@@ -1,4 +1,3 @@
--- name: finding.user_event_not_loaded
 -- title: Patterns that load no event
 -- description: Patterns of --events load nothing. Events of the kernel belong to no thread of a
 --     process, and --ignore leaves events out. Patterns of what msgflow reads in any case are not
@@ -32,8 +31,7 @@ other AS (
     GROUP BY e.name
 ),
 listed AS (
-    SELECT string_agg(printf('%s (%d)', name, event_count), ', ' ORDER BY name) AS names
-    FROM other
+    SELECT string_agg(printf('%s (%d)', name, event_count), ', ' ORDER BY name) AS names FROM other
 )
 SELECT
     count(*) AS count,

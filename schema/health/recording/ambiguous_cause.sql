@@ -1,4 +1,3 @@
--- name: finding.ambiguous_cause
 -- title: It is not certain which messages led to what a node published
 -- description: The declaration of an indirect link says which inputs a node publishes for, and for
 --     some publications several messages of an input fit. Flows follow the likeliest of them all

@@ -1,4 +1,3 @@
--- name: finding.ambiguous_link
 -- title: Messages that several publications could have been
 -- description: The publication of a message was chosen among several. Flows follow it all the same:
 --     paths and latencies count it in their column ambiguous.

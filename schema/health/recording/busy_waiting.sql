@@ -1,4 +1,3 @@
--- name: finding.busy_waiting
 -- title: An executor that waits busily
 -- description: The threads of an executor looked for work many times as often as they found some.
 --     That costs CPU time, which callbacks may lack, and most of the events of the trace are about
@@ -14,8 +13,7 @@
 -- severity: warning
 -- when: store.executor WHERE kind LIKE 'multi_threaded%'
 WITH waited AS (
-    SELECT
-        s.run_id, s.executor_id, count(*) AS number, count(DISTINCT s.thread_id) AS threads
+    SELECT s.run_id, s.executor_id, count(*) AS number, count(DISTINCT s.thread_id) AS threads
     FROM derive.executor_interval AS s
     SEMI JOIN (FROM store.executor WHERE kind LIKE 'multi_threaded%') AS e
         ON s.executor_id = e.executor_id

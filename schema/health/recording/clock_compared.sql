@@ -1,4 +1,3 @@
--- name: finding.clock_compared
 -- kind: inline
 -- description: Clocks that messages or packets went between, if messages were to bring those of the
 --     run together.

@@ -1,4 +1,3 @@
--- name: finding.clock_jumps
 -- title: The clock of a host was set while recording
 -- description: The clock that stamps messages stepped against the clock of the trace by more than
 --     100 ms. Matching by equal stamps is not affected. Latencies measured by stamps are. Where
@@ -20,8 +19,7 @@ WITH step AS (
     )
 )
 SELECT
-    s.run_id,
-    h.hostname AS subject,
+    s.run_id, h.hostname AS subject,
     count(*) AS count,
     printf(
         '%s, the largest %.3f %s',

@@ -1,4 +1,3 @@
--- name: finding.clock_name
 -- kind: inline
 -- description: How clocks are named in details, if messages were to bring those of the run
 --     together.

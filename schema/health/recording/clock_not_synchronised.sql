@@ -1,4 +1,3 @@
--- name: finding.clock_not_synchronised
 -- title: Clocks that messages could not bring together
 -- description: The clocks of the run were to be corrected by messages, but nothing connects the
 --     clock with the others, or messages go one way only.
@@ -37,8 +36,7 @@ WHERE c.reference_clock_id <> o.reference_clock_id
 UNION ALL
 SELECT
     $run_id,
-    n.name,
-    0,
+    n.name, 0,
     printf('the clock of %s stays apart: no message between it and the others is known', n.name)
 FROM clock_name AS n
 WHERE n.clock_id NOT IN (

@@ -1,4 +1,3 @@
--- name: finding.clock_set
 -- title: A clock was set, and messages around that moment have no link
 -- description: Messages are matched by time (Humble, Iron), and the clock that stamps them was set.
 --     What was stamped between the moment until which its difference from the clock of the trace is
@@ -36,8 +35,7 @@ missed AS (
     GROUP BY z.clock_id, z.segment
 )
 SELECT
-    z.run_id,
-    h.hostname AS subject,
+    z.run_id, h.hostname AS subject,
     coalesce(m.number, 0) AS count,
     printf(
         '%+.3f ms between %.3f s and %.3f s after recording began',

@@ -1,4 +1,3 @@
--- name: finding.clock_uneven
 -- title: Clocks that do not run evenly
 -- description: No straight line fits the difference of two clocks, so that corrected times are off.
 -- cause: A clock was set or slewed while recording, or its rate changed.

@@ -1,4 +1,3 @@
--- name: finding.clocks_apart
 -- title: The clocks of two hosts are apart
 -- description: Messages seem to arrive before they were published. Latencies between the two hosts
 --     are wrong by at least that much. Links are right all the same, since they compare stamps.

@@ -1,4 +1,3 @@
--- name: finding.clocks_not_together
 -- title: The clocks of two hosts are not synchronised
 -- description: Latencies between the two contain the difference of their clocks, which is not
 --     known.

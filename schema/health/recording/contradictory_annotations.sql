@@ -1,4 +1,3 @@
--- name: finding.contradictory_annotations
 -- title: Annotations that contradict each other
 -- description: Inputs and outputs that two annotations declare as links of different kinds:
 --     periodic_async, partial_sync, approximate_sync or queue. They use the messages in different

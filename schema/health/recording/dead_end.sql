@@ -1,4 +1,3 @@
--- name: finding.dead_end
 -- title: Messages that end at a node which publishes
 -- description: No callback of a subscription led to anything, but the node publishes by a timer,
 --     outside of callbacks, or because of other messages. If it keeps the messages for that, paths

@@ -1,4 +1,3 @@
--- name: finding.discarded_events
 -- title: The tracer discarded events
 -- description: Events were lost because the buffers were full. What happened in those gaps is
 --     missing, nothing is paired across them, and results near them are marked is_loss_affected.
@@ -14,13 +13,10 @@
 -- grain: one row per trace
 -- severity: error
 -- when: store.gap WHERE kind = 'loss'
-WITH damaged AS (
-    SELECT DISTINCT trace_id FROM store.finding WHERE name = 'damaged_trace'
-),
+WITH damaged AS (SELECT DISTINCT trace_id FROM store.finding WHERE name = 'damaged_trace'),
 loss AS (
     SELECT
-        g.run_id,
-        g.trace_id,
+        g.run_id, g.trace_id,
         count(*) AS places,
         CASE WHEN count(g.event_count) > 0
             THEN least(sum(g.event_count), 9007199254740992)::BIGINT END AS events,
@@ -39,8 +35,7 @@ fullest AS (
 ),
 sized AS (
     SELECT
-        l.*,
-        f.is_uncounted,
+        l.*, f.is_uncounted,
         -- About 100 bytes for an event, the next power of two that holds the packet and the burst.
         -- LTTng takes no less than a page.
         CASE
@@ -51,8 +46,7 @@ sized AS (
     JOIN fullest AS f ON l.trace_id = f.trace_id
 )
 SELECT
-    l.run_id,
-    l.trace_id,
+    l.run_id, l.trace_id,
     coalesce(l.events, l.places) AS count,
     printf(
         '%s%s in %s, %.3f s in all; ',

@@ -1,4 +1,3 @@
--- name: finding.doubtful_answer
 -- title: A node may publish by a timer what seems to answer messages
 -- description: A node without traced callbacks (rclpy, wait sets) publishes after messages, but not
 --     as answers come: at the times of a timer, at intervals that the messages do not have, more

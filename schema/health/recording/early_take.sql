@@ -1,4 +1,3 @@
--- name: finding.early_take
 -- title: Messages received before publish() returned
 -- description: Messages were received before the call returned that published them, on the same
 --     clock. Their latencies are negative.

@@ -1,4 +1,3 @@
--- name: finding.equal_names
 -- title: Nodes of several processes have one name at a time
 -- description: Their names go with the host or the process behind them, in all tables, pages and
 --     exports, and nothing is added up across them. Topics of one name are one topic: a message of

@@ -1,4 +1,3 @@
--- name: finding.executor_preempted
 -- title: Other threads take the CPU from an executor
 -- description: Callbacks of an executor with normal priority had work to do, but another thread had
 --     the CPU for more than a tenth of that time. They take that much longer than they compute.
@@ -34,9 +33,7 @@ taken AS (
     WHERE s.state = 'preempted'
     GROUP BY ALL
 ),
-first AS (
-    SELECT thread_id, arg_max(name, (length_ns, name)) AS name FROM taken GROUP BY thread_id
-),
+first AS (SELECT thread_id, arg_max(name, (length_ns, name)) AS name FROM taken GROUP BY thread_id),
 -- The least urgent one that it ran with.
 priority AS (
     SELECT thread_id, max(priority) AS priority

@@ -1,4 +1,3 @@
--- name: finding.hanging_callback
 -- title: A callback that never ended
 -- description: A callback was still running when the recording ended, at least half a second after
 --     the last that its thread did, and ten times as long as it ever took before. What its executor
@@ -16,9 +15,7 @@ WITH hanging AS MATERIALIZED (
     SELECT run_id, process_id, thread_id, callback_instance_id, callback_id, start_ns
     FROM derive.hanging_callback
 ),
-host_end AS (
-    SELECT host_id, max(last_seen_ns) AS end_ns FROM store.process GROUP BY host_id
-),
+host_end AS (SELECT host_id, max(last_seen_ns) AS end_ns FROM store.process GROUP BY host_id),
 usual AS (
     SELECT
         callback_id, count(*) AS runs, max(end_ns - start_ns) AS longest_ns,

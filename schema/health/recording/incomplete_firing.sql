@@ -1,4 +1,3 @@
--- name: finding.incomplete_firing
 -- title: Publications for which an input had no message
 -- description: Publications that an annotation explains, but for which some of its inputs had no
 --     message.

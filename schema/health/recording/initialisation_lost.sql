@@ -1,4 +1,3 @@
--- name: finding.initialisation_lost
 -- title: Events of initialisation were lost
 -- description: Objects were used whose creation is not in the trace, and the trace lost events at
 --     the time when their process started. These objects are placeholders with no name, or with one
@@ -14,8 +13,7 @@
 SELECT
     p.run_id,
     printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
-    u.count,
-    u.detail
+    u.count, u.detail
 FROM derive.unseen_creation AS u
 JOIN main.process AS p ON u.process_id = p.process_id
 JOIN main.host AS h ON p.host_id = h.host_id

@@ -1,4 +1,3 @@
--- name: finding.kernel_events_lost
 -- title: Kernel events were lost
 -- description: Kernel events are missing, on any CPU. States of threads meanwhile are marked
 --     is_loss_affected: a switch or a waking in them may not be seen.
@@ -19,8 +18,7 @@ callback AS (
     GROUP BY run_id
 )
 SELECT
-    s.run_id,
-    s.affected AS count,
+    s.run_id, s.affected AS count,
     printf(
         '%d of %s of threads, %s', s.affected, derive.counted(s.states, 'state'),
         derive.counted(coalesce(c.affected, 0), 'callback instance')

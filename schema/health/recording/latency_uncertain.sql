@@ -1,4 +1,3 @@
--- name: finding.latency_uncertain
 -- title: The clocks of two hosts are not known well enough for the latencies between them
 -- description: Most messages between the two took less time than the possible error of their
 --     latency.

@@ -1,4 +1,3 @@
--- name: finding.lost_packets
 -- title: Whole packets are missing
 -- description: The numbers of the packets skip some, or the stream of one CPU ends before the
 --     events of others. What happened in these packets is missing, and nothing is paired across the
@@ -13,8 +12,7 @@
 -- severity: error
 -- when: store.gap WHERE kind = 'packets'
 SELECT
-    run_id,
-    trace_id,
+    run_id, trace_id,
     count(*) AS count,
     printf(
         '%s on %s, %.3f s in all',

@@ -1,4 +1,3 @@
--- name: finding.message_without_stamp
 -- title: Messages cannot be followed, because they have no stamp
 -- description: Subscriptions got messages without a stamp, so that their publication cannot be
 --     identified, and no gap of the trace explains it. Their flows begin at the take. For

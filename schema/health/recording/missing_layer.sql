@@ -1,4 +1,3 @@
--- name: finding.missing_layer
 -- title: A kind of event is missing altogether
 -- description: The traces lack a kind of event that the other events of the run call for. So a
 --     whole part of the answers is empty.

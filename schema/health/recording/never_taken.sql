@@ -1,4 +1,3 @@
--- name: finding.never_taken
 -- title: A subscription that took no message of a publisher
 -- description: Publisher and subscription of a topic were both recorded, but not one message was
 --     taken. These messages count as not connected (never_taken), not as lost. Topics of ROS itself

@@ -1,4 +1,3 @@
--- name: finding.no_longer_taken
 -- title: A subscription that took nothing more of a publisher
 -- description: Until some moment the subscription took messages of the publisher. Later ones were
 --     published, and the process of the subscription went on, but it took none. What became of them

@@ -1,4 +1,3 @@
--- name: finding.partly_taken
 -- title: A subscription that gets only a part of the messages of a publisher
 -- description: Between messages that it took, many others did not reach it, although its queue had
 --     room. They count as lost (not_delivered, lost_in_transport). A content filter leaves no

@@ -1,4 +1,3 @@
--- name: finding.path_cut
 -- title: Paths that go on beyond the limits
 -- description: Chains of topics go on, or have siblings, beyond the limits of the search for paths.
 --     Those are missing among paths.

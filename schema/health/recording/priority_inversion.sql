@@ -1,4 +1,3 @@
--- name: finding.priority_inversion
 -- title: Less urgent threads delay an executor with real-time priority
 -- description: An executor with real-time priority lost the CPU to a less urgent thread. Or it
 --     slept in a callback until another thread woke it, and that one had to wait for a CPU which a
@@ -34,8 +33,7 @@ delay AS (
     FROM urgent
     WHERE state = 'preempted' AND preempted_by_priority > priority
     UNION ALL
-    SELECT
-        a.run_id, a.thread_id, sum(least(a.end_ns, w.end_ns) - greatest(a.start_ns, w.start_ns))
+    SELECT a.run_id, a.thread_id, sum(least(a.end_ns, w.end_ns) - greatest(a.start_ns, w.start_ns))
     FROM asleep AS a
     JOIN main.preemptor AS w
         ON a.waker_thread_id = w.thread_id AND w.start_ns < a.end_ns AND w.end_ns > a.start_ns

@@ -1,4 +1,3 @@
--- name: finding.process_fell_silent
 -- title: A process that fell silent
 -- description: The process has no event in the last half second of the recording or longer, though
 --     messages were sent to it meanwhile, and its middleware did not say goodbye, as it does when
@@ -24,9 +23,7 @@ announced AS (
     WHERE publisher_id IS NULL AND rclcpp_ns IS NULL AND rcl_ns IS NULL AND rmw_ns IS NOT NULL
     GROUP BY process_id
 ),
-host_end AS (
-    SELECT host_id, max(last_seen_ns) AS end_ns FROM store.process GROUP BY host_id
-)
+host_end AS (SELECT host_id, max(last_seen_ns) AS end_ns FROM store.process GROUP BY host_id)
 SELECT
     p.run_id,
     printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,

@@ -1,4 +1,3 @@
--- name: finding.process_without_ros
 -- title: A traced process has no ROS events
 -- description: The trace has events of the process, but no node, publisher, subscription, service,
 --     client, timer or callback. What it does with messages is not known.

@@ -1,4 +1,3 @@
--- name: finding.publication_without_event
 -- title: Messages of a topic are matched by time
 -- description: The middleware has no event for publications of the topic, although nothing was
 --     lost, so that they have no stamp. A message is of a publication if it was stamped before

@@ -1,4 +1,3 @@
--- name: finding.publisher_not_traced
 -- title: Messages come from a publisher that is not traced, or events are missing
 -- description: Messages were taken whose publication is not in the traces, although the known
 --     publishers have no gap at that time. Their flows begin at the take.

@@ -1,4 +1,3 @@
--- name: finding.publisher_without_events
 -- title: A publisher whose publications are not traced
 -- description: Messages of a topic were taken whose publication is not in the traces. A publisher
 --     of the topic was recorded, but not one publication of it. Flows of these messages begin at
@@ -27,8 +26,7 @@ WITH silent AS (
     GROUP BY b.run_id, b.topic_name
 )
 SELECT
-    o.run_id,
-    s.topic_name AS subject,
+    o.run_id, s.topic_name AS subject,
     count(*) AS count,
     printf('%s, and no publication of %s', derive.counted(count(*), 'message'), l.labels) AS detail
 FROM store.orphan_take AS o

@@ -1,4 +1,3 @@
--- name: finding.real_time_threads_share_cpu
 -- title: Several executors with real-time priority share a CPU
 -- description: Threads of executors with real-time priority ran on one CPU nearly all of the time.
 --     While one of them runs, those of the same priority and the less urgent ones have to wait,

@@ -1,4 +1,3 @@
--- name: finding.service_without_callbacks
 -- title: Services of actions whose callbacks have no events
 -- description: The process took requests of these services and ran none of its callbacks with them,
 --     as far as the trace shows. So these callbacks have no duration and no wait, and do not count

@@ -1,4 +1,3 @@
--- name: finding.started_late
 -- title: Tracing started after ROS
 -- description: Objects were used whose creation is not in the trace. They are placeholders with no
 --     name, or with one deduced from messages. So topics and nodes are missing from results. Not
@@ -16,8 +15,7 @@
 SELECT
     p.run_id,
     printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
-    u.count,
-    u.detail
+    u.count, u.detail
 FROM derive.unseen_creation AS u
 JOIN main.process AS p ON u.process_id = p.process_id
 JOIN main.host AS h ON p.host_id = h.host_id

@@ -1,4 +1,3 @@
--- name: finding.stream_ends_early
 -- title: Streams end before their trace
 -- description: The last packet of a CPU ends more than half a second before the last one of other
 --     CPUs, all chunks and snapshots of the recording considered. Events of that CPU may be missing
@@ -11,8 +10,7 @@
 -- severity: warning
 -- when: derive.early_stream
 SELECT
-    run_id,
-    path AS subject,
+    run_id, path AS subject,
     count(*) AS count,
     printf(
         '%s (CPU %s) end up to %.3f s early',

@@ -1,4 +1,3 @@
--- name: finding.topic_unnamed
 -- title: A topic has no name
 -- description: Its publishers and subscriptions were created before the recording, or their events
 --     were lost. Its messages are in flows and paths as ?, and no query can ask for it by name.

@@ -1,4 +1,3 @@
--- name: finding.trace_ends_early
 -- title: The events of a publisher end before its messages
 -- description: Messages were taken that were sent after the last event of every known publisher of
 --     the topic. Their flows begin at the take, and what the process did last is missing.

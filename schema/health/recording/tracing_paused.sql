@@ -1,4 +1,3 @@
--- name: finding.tracing_paused
 -- title: Tracing was paused
 -- description: All streams of a trace are silent at once between packets. What happened meanwhile
 --     is missing, and nothing is paired across the pause.
@@ -9,8 +8,7 @@
 -- severity: warning
 -- when: store.gap WHERE kind = 'pause'
 SELECT
-    run_id,
-    trace_id,
+    run_id, trace_id,
     count(*) AS count,
     printf(
         '%s, %.3f s in all, the longest %.3f s',

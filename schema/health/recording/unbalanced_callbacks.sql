@@ -1,4 +1,3 @@
--- name: finding.unbalanced_callbacks
 -- title: Callbacks without an end
 -- description: Callback instances have no end although their thread went on, and no gap in the
 --     record of the thread explains it. Their durations are not known. What they published is still
@@ -6,8 +5,7 @@
 -- cause: The callback threw an exception that was caught further up, or the event callback_end is
 --     not enabled; or it is of a service that answers later, before Kilted, in an executor that has
 --     no events.
--- cure: Enable ros2:callback_end; look at the callbacks (msgflow query callbacks) for
---     exceptions.
+-- cure: Enable ros2:callback_end; look at the callbacks (msgflow query callbacks) for exceptions.
 -- grain: one row per process
 -- severity: warning
 -- when: store.callback_instance WHERE end_ns IS NULL
@@ -21,9 +19,7 @@ near AS (
     FROM main.callback_instance
     WHERE thread_id IN (SELECT thread_id FROM unended)
 ),
-last AS (
-    SELECT thread_id, max(start_ns) AS start_ns FROM near GROUP BY thread_id
-),
+last AS (SELECT thread_id, max(start_ns) AS start_ns FROM near GROUP BY thread_id),
 open AS (
     SELECT u.*
     FROM unended AS u

@@ -1,4 +1,3 @@
--- name: finding.unmatched_take
 -- title: Messages received whose publication is not known
 -- description: Messages were received whose publication is not known. Their flows begin at the
 --     take.
@@ -11,8 +10,7 @@
 -- severity: warning
 -- when: store.orphan_take
 SELECT
-    run_id,
-    trace_id,
+    run_id, trace_id,
     sum(number) AS count,
     'messages received whose publication is not known'
     || CASE WHEN has_no_stamp THEN ', and that carry no stamp: ' ELSE ': ' END

@@ -1,11 +1,9 @@
--- name: finding.untaken_pair
 -- kind: inline
 -- description: Publishers and subscriptions between which messages ended for one reason: who they
 --     are, in words and by their ids, and how many messages.
 -- grain: one row per topic, publishing node, subscribing node and reason
 SELECT
-    u.run_id,
-    u.reason,
+    u.run_id, u.reason,
     printf(
         '%s: %s (%s %d) → %s (%s %d)', s.topic_name,
         coalesce(pn.full_name, '?'), coalesce(pp.name, '?'), pp.pid,

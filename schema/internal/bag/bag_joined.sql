@@ -1,5 +1,3 @@
--- name: internal.bag_joined
--- title: Messages of a bag, and the publications that they may be the messages of
 -- description: A subscription gets a message after it was sent, and soon: within the time in which
 --     99 % of the traced takes of its topic got theirs, of all topics where none is traced. It was
 --     sent when the stamp of the middleware says, which is of the clock of ROS as the bag is. On
@@ -7,19 +5,8 @@
 --     its uncertainty, in either direction. A message is joined if exactly one publication of its
 --     topic was sent in that time, and no other message of the bag may be that one too.
 -- grain: one row per message of the bag
--- column: message BIGINT  Number of the message in the bag
--- column: topic_name VARCHAR  Name of the topic
--- column: type_name VARCHAR  Type of the message
--- column: received_ns BIGINT [epoch ns]  When the recorder received it, clock of ROS
--- column: size_bytes BIGINT [bytes]  Size as it was sent
--- column: stamp_ns BIGINT [epoch ns]  header.stamp; NULL: none
--- column: frame_id VARCHAR  header.frame_id; NULL: none
--- column: publication_id BIGINT  Its publication; NULL: not known
--- column: reason VARCHAR  Why not: 'topic_not_published', 'no_publication' or 'ambiguous'
--- column: bound_ns BIGINT [ns]  How long after it was sent the message may be received
 WITH sent AS (
-    SELECT
-        b.publication_id, p.topic_name, coalesce(b.source_timestamp_ns, b.start_ns) AS sent_ns
+    SELECT b.publication_id, p.topic_name, coalesce(b.source_timestamp_ns, b.start_ns) AS sent_ns
     FROM main.publication AS b
     JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
     WHERE b.run_id = $run_id

@@ -1,4 +1,3 @@
--- name: internal.bag_topic
 -- title: What became of the messages of a bag, by topic
 -- description: How many messages of a bag were joined to their publication, and why others were
 --     not.

@@ -1,16 +1,6 @@
--- name: internal.clock_as_recorded
--- title: Clocks without a correction
 -- description: What store.clock holds of the clocks of a run that nothing corrects: their times are
 --     as recorded, counted from the begin of their first trace.
 -- grain: one row per clock
--- column: clock_id BIGINT  Clock
--- column: offset_ns BIGINT [ns]  As in store.clock, like those below
--- column: drift_ppb BIGINT [1e-9]  None
--- column: reference_ns BIGINT [epoch ns]  Begin of the first trace of its hosts; 0 without traces
--- column: uncertainty_ns BIGINT [ns]  Not known
--- column: drift_uncertainty_ppb BIGINT [1e-9]  Not known
--- column: reference_clock_id BIGINT  None
--- column: method VARCHAR  none
 SELECT
     c.clock_id,
     0::BIGINT AS offset_ns,

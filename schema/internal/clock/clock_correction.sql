@@ -1,21 +1,12 @@
--- name: internal.clock_correction
--- title: How far corrected clocks can be wrong
 -- description: Clocks that are corrected to another one, and how well that is known.
 -- grain: one row per clock that is corrected
--- column: run_id BIGINT  Run
--- column: reference VARCHAR  Hosts of the clock that it is corrected to
--- column: hosts VARCHAR  Its hosts
--- column: least_ms DOUBLE [ms]  Bound where it is known best; NULL: a file gave the correction
--- column: greatest_ms DOUBLE [ms]  Bound where it is known worst
 WITH known AS (
     SELECT clock_id, min(uncertainty_ns) AS least_ns, max(uncertainty_ns) AS greatest_ns
     FROM main.clock_uncertainty
     GROUP BY clock_id
 )
 SELECT
-    c.run_id,
-    r.hosts AS reference,
-    n.hosts,
+    c.run_id, r.hosts AS reference, n.hosts,
     coalesce(k.least_ns, c.uncertainty_ns) / 1e6 AS least_ms,
     coalesce(k.greatest_ns, c.uncertainty_ns) / 1e6 AS greatest_ms
 FROM main.clock AS c

@@ -1,16 +1,9 @@
--- name: internal.clock_from_messages
--- title: Clocks as messages and packets correct them
 -- description: What store.clock holds of the clocks of a run that messages and packets bring
 --     together; whether they connect the clock with another one, since it stays as it is if not;
 --     and how far it can be wrong at some moments, a list.
 -- grain: one row per clock
 SELECT
-    clock_id,
-    offset_ns,
-    drift_ppb,
-    reference_ns,
-    uncertainty_ns,
-    drift_uncertainty_ppb,
+    clock_id, offset_ns, drift_ppb, reference_ns, uncertainty_ns, drift_uncertainty_ppb,
     reference_clock_id,
     CASE
         WHEN clock_id = reference_clock_id THEN 'none'

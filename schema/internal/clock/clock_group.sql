@@ -1,13 +1,6 @@
--- name: internal.clock_group
--- title: Clocks that are together
 -- description: Clocks that are corrected to the same one. The bound of two clocks is the sum of
 --     theirs, and that of the reference is 0.
 -- grain: one row per clock that others are corrected to, or that stands alone
--- column: run_id BIGINT  Run
--- column: hosts VARCHAR  Hosts of the clocks
--- column: clocks BIGINT  How many
--- column: greatest_ms DOUBLE [ms]  Most by which two of them can differ; NULL: not known
--- column: is_tried BOOLEAN  Messages were to bring the clocks of the run together
 WITH known AS (
     SELECT clock_id, max(uncertainty_ns) AS greatest_ns
     FROM main.clock_uncertainty

@@ -1,11 +1,6 @@
--- name: internal.clock_known
--- title: Clocks by their names
 -- description: By what a file can name the clocks of a run: their UUID, and the hosts that they are
 --     of.
 -- grain: one row per clock
--- column: clock_id BIGINT  Clock
--- column: uuid VARCHAR  Its UUID
--- column: hostnames VARCHAR[]  Hosts
 SELECT c.clock_id, c.uuid, list(h.hostname ORDER BY h.host_id) AS hostnames
 FROM main.clock AS c
 JOIN main.host AS h ON c.clock_id = h.clock_id

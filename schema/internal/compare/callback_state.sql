@@ -1,4 +1,3 @@
--- name: internal.callback_state
 -- title: What callbacks did with their time
 -- description: By callback, all its instances that began in the window together, where the kernel
 --     was traced.

@@ -1,5 +1,3 @@
--- name: internal.callback_time
--- title: What callbacks that changed spent their time on
 -- description: How the mean duration of callbacks differs between two runs, by what their threads
 --     did. Only callbacks whose duration is known to differ, and that the kernel's trace of both
 --     runs shows, the greatest difference first.

@@ -1,4 +1,3 @@
--- name: internal.change_part
 -- title: What the changes of paths consist of
 -- description: The difference of the means of a path (`compared`: rows of `main.comparison`) is the
 --     sum of the differences of its parts (`part_a` and `part_b`: rows of `path-breakdown`): the
@@ -42,10 +41,7 @@ both_sides AS (
         SELECT 'b', path, node, part, what, total_ns FROM part_b
     ) AS p
     -- A part that only one of them can tell would look like a change.
-    LEFT JOIN (
-        FROM spent
-        QUALIFY count(DISTINCT side) OVER (PARTITION BY node, what) = 2
-    ) AS s
+    LEFT JOIN (FROM spent QUALIFY count(DISTINCT side) OVER (PARTITION BY node, what) = 2) AS s
         ON p.side = s.side AND p.node = s.node AND p.what = s.what AND p.part = 'callback'
 ),
 part AS (
@@ -58,9 +54,7 @@ part AS (
     WHERE c.statistic = 'mean' AND c.a_count > 0 AND c.b_count > 0
     GROUP BY s.path, s.node, s.part, s.what
 ),
-whole AS (
-    SELECT path, sum(a_ns) AS a_ns, sum(b_ns) AS b_ns FROM part GROUP BY path
-),
+whole AS (SELECT path, sum(a_ns) AS a_ns, sum(b_ns) AS b_ns FROM part GROUP BY path),
 every AS (
     SELECT path, NULL AS node, 'all' AS part, NULL AS what, a_ns, b_ns FROM whole
     UNION ALL
@@ -69,9 +63,7 @@ every AS (
 SELECT
     round(e.b_ns - e.a_ns)::BIGINT AS difference_ns,
     round((e.b_ns - e.a_ns) / nullif(w.b_ns - w.a_ns, 0), 4) AS share,
-    e.node,
-    e.part,
-    e.what,
+    e.node, e.part, e.what,
     round(e.a_ns)::BIGINT AS a_mean_ns,
     round(e.b_ns)::BIGINT AS b_mean_ns,
     e.path

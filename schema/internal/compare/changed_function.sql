@@ -1,5 +1,3 @@
--- name: internal.changed_function
--- title: Functions whose CPU time changed
 -- description: In which functions a callback was more or less CPU time per call than in another
 --     run, what they call not counted. Only callbacks that samples of perf saw in both, and
 --     differences beyond what is chance in so few samples (three standard deviations).
@@ -8,16 +6,8 @@
 -- param: run_a, run_b
 -- param: at_least DOUBLE  Smallest difference that counts as one, as a share of A
 -- param: skip_first, a_window, b_window
--- column: node VARCHAR [node]  Node of the callback
--- column: callback VARCHAR [callback]  What triggers it
--- column: function VARCHAR  The function
--- column: a_ns BIGINT [ns]  CPU time in it, for each instance of the callback in run A
--- column: b_ns BIGINT [ns]  The same in run B
--- column: a_samples BIGINT  Samples of it in run A
--- column: b_samples BIGINT  Samples of it in run B
 WITH instance AS (
-    SELECT side = 'a' AS is_a, node, label, callback_instance_id
-    FROM compared_instance
+    SELECT side = 'a' AS is_a, node, label, callback_instance_id FROM compared_instance
 ),
 sample AS (
     SELECT i.is_a, i.node, i.label, f.function, s.cpu_ns
@@ -39,9 +29,7 @@ call AS (
 ),
 compared AS (
     SELECT
-        c.node,
-        c.label,
-        s.function,
+        c.node, c.label, s.function,
         coalesce(sum(s.cpu_ns) FILTER (WHERE s.is_a), 0) / any_value(c.a_calls) AS a_ns,
         coalesce(sum(s.cpu_ns) FILTER (WHERE NOT s.is_a), 0) / any_value(c.b_calls) AS b_ns,
         count(*) FILTER (WHERE s.is_a) AS a_samples,

@@ -1,13 +1,11 @@
--- name: internal.changes
 -- title: What changed
 -- description: A comparison (`compared`: rows of `main.comparison`) with a row for each subject,
 --     those that differ first, then the greatest change of a median.
 -- grain: one row per path, callback or topic
 -- param: only_different BOOLEAN  Leave out rows without a shown difference
--- column: change VARCHAR            'longer', 'shorter', 'both' (of different statistics),
---     'only in A', 'only in B', 'about equal' (less than matters), 'none shown' (the intervals
---     contain 0), or why it is not known:
---     'too few values', 'too few independent values', 'too few resamples'
+-- column: change VARCHAR            'longer', 'shorter', 'both' (of different statistics), 'only in
+--     A', 'only in B', 'about equal' (less than matters), 'none shown' (the intervals contain 0),
+--     or why it is not known: 'too few values', 'too few independent values', 'too few resamples'
 -- column: of VARCHAR                Statistics of which that is said
 -- column: a_median_ns BIGINT [ns]   Median in run A
 -- column: b_median_ns BIGINT [ns]   Median in run B
@@ -67,18 +65,10 @@ SELECT
         ELSE median.verdict
     END AS change,
     coalesce(differing, alike, estimated) AS of,
-    median.a AS a_median_ns,
-    median.b AS b_median_ns,
-    median.percent AS median_percent,
-    median.verdict AS median_verdict,
-    p95.a AS a_p95_ns,
-    p95.b AS b_p95_ns,
-    p95.percent AS p95_percent,
-    p95.verdict AS p95_verdict,
-    longest.a AS a_max_ns,
-    longest.b AS b_max_ns,
-    longest.percent AS max_percent,
-    longest.verdict AS max_verdict,
+    median.a AS a_median_ns, median.b AS b_median_ns, median.percent AS median_percent,
+    median.verdict AS median_verdict, p95.a AS a_p95_ns, p95.b AS b_p95_ns,
+    p95.percent AS p95_percent, p95.verdict AS p95_verdict, longest.a AS a_max_ns,
+    longest.b AS b_max_ns, longest.percent AS max_percent, longest.verdict AS max_verdict,
     a_share, b_share, a_count, b_count, a_ambiguous, b_ambiguous, subject AS path
 FROM subject
 WHERE NOT $only_different OR is_longer OR is_shorter OR only_in IS NOT NULL

@@ -1,4 +1,3 @@
--- name: internal.compared_instance
 -- kind: inline
 -- description: The callback instances of two runs, or of two windows of time, that are compared.
 -- grain: one row per side, 'a' or 'b', and callback instance in it

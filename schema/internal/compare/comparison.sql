@@ -1,5 +1,3 @@
--- name: internal.comparison
--- title: How a run differs from another one
 -- description: The rows of `main.comparison`, and what `compare` can be asked with.
 -- grain: one row per thing compared and statistic
 -- param: run_a BIGINT  Run that the other one is compared with

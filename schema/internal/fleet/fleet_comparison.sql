@@ -1,4 +1,3 @@
--- name: internal.fleet_comparison
 -- title: How runs of one side differ from those of another
 -- description: Compares two sides by `measured` (rows of `internal.fleet_run_value`). A run, or
 --     what it is a sample of, is one value, however many flows it has. The difference
@@ -47,15 +46,11 @@ WITH of_run AS (
     GROUP BY side, subject, unit, run
 ),
 deepest AS (
-    SELECT side, subject, unit, max(depth) AS depth
-    FROM of_run
-    GROUP BY side, subject, unit
+    SELECT side, subject, unit, max(depth) AS depth FROM of_run GROUP BY side, subject, unit
 ),
 allowing AS (
     SELECT
-        u.side,
-        u.subject,
-        w.depth,
+        u.side, u.subject, w.depth,
         count(*) FILTER (u.depth >= w.depth) AS units,
         count(*) FILTER (u.depth > 0) AS whole
     FROM deepest AS u
@@ -84,9 +79,7 @@ counted AS (
 ),
 of_side AS (
     SELECT
-        m.side,
-        m.subject,
-        m.statistic,
+        m.side, m.subject, m.statistic,
         sum(m.number)::BIGINT AS flows,
         sum(m.roots) AS roots,
         sum(m.reached) AS reached,
@@ -105,18 +98,10 @@ unit AS (
     JOIN counted AS c ON m.side = c.side AND m.subject = c.subject AND m.run = c.run
     GROUP BY m.side, m.unit, m.subject, m.statistic
 ),
-scaled AS (
-    SELECT
-        *,
-        min(value_ns) OVER (PARTITION BY subject) > 0 AS is_log
-    FROM unit
-),
+scaled AS (SELECT *, min(value_ns) OVER (PARTITION BY subject) > 0 AS is_log FROM unit),
 ranked AS (
     SELECT
-        side,
-        subject,
-        statistic,
-        is_log,
+        side, subject, statistic, is_log,
         CASE WHEN is_log THEN ln(value_ns) ELSE value_ns END AS x,
         row_number() OVER (PARTITION BY side, subject, statistic ORDER BY value_ns, unit) AS nth,
         count(*) OVER (PARTITION BY side, subject, statistic) AS number,
@@ -125,9 +110,7 @@ ranked AS (
 ),
 ends AS (
     SELECT
-        side,
-        subject,
-        statistic,
+        side, subject, statistic,
         any_value(is_log) AS is_log,
         any_value(number) AS number,
         any_value(number - 2 * trimmed) AS kept,
@@ -140,9 +123,7 @@ ends AS (
 ),
 centre AS (
     SELECT
-        e.side,
-        e.subject,
-        e.statistic,
+        e.side, e.subject, e.statistic,
         any_value(e.is_log) AS is_log,
         any_value(e.number) AS number,
         any_value(e.kept) AS kept,
@@ -154,53 +135,33 @@ centre AS (
         var_samp(greatest(e.lowest, least(e.highest, r.x))) * (any_value(e.number) - 1)
             / any_value(e.kept * (e.kept - 1)) AS error
     FROM ends AS e
-    JOIN ranked AS r
-        ON e.side = r.side AND e.subject = r.subject AND e.statistic = r.statistic
+    JOIN ranked AS r ON e.side = r.side AND e.subject = r.subject AND e.statistic = r.statistic
     GROUP BY e.side, e.subject, e.statistic
 ),
 known AS (
     SELECT
-        s.side,
-        s.subject,
-        s.statistic,
-        s.flows,
-        s.roots,
-        s.reached,
-        s.loss_affected,
-        s.ambiguous,
-        s.is_cut,
-        s.units,
-        s.is_enough,
-        c.is_log,
-        c.number,
-        c.kept,
-        c.centre,
-        c.error,
+        s.side, s.subject, s.statistic, s.flows, s.roots, s.reached, s.loss_affected, s.ambiguous,
+        s.is_cut, s.units, s.is_enough, c.is_log, c.number, c.kept, c.centre, c.error,
         c.spread_percent,
         round(CASE WHEN c.is_log THEN exp(c.centre) ELSE c.centre END)::BIGINT AS value_ns
     FROM of_side AS s
-    LEFT JOIN centre AS c
-        ON s.side = c.side AND s.subject = c.subject AND s.statistic = c.statistic
+    LEFT JOIN centre AS c ON s.side = c.side AND s.subject = c.subject AND s.statistic = c.statistic
 ),
 paired AS (
     SELECT
         coalesce(a.subject, b.subject) AS subject,
         coalesce(a.statistic, b.statistic) AS statistic,
-        a.value_ns AS a_ns,
-        b.value_ns AS b_ns,
+        a.value_ns AS a_ns, b.value_ns AS b_ns,
         coalesce(a.is_log, b.is_log) AS is_log,
         coalesce(a.number, 0) AS a_count,
         coalesce(b.number, 0) AS b_count,
-        a.spread_percent AS a_spread_percent,
-        b.spread_percent AS b_spread_percent,
+        a.spread_percent AS a_spread_percent, b.spread_percent AS b_spread_percent,
         coalesce(a.flows, 0) AS a_flows,
         coalesce(b.flows, 0) AS b_flows,
         a.reached / nullif(a.roots, 0) AS a_share,
         b.reached / nullif(b.roots, 0) AS b_share,
-        a.loss_affected AS a_loss_affected,
-        b.loss_affected AS b_loss_affected,
-        a.ambiguous AS a_ambiguous,
-        b.ambiguous AS b_ambiguous,
+        a.loss_affected AS a_loss_affected, b.loss_affected AS b_loss_affected,
+        a.ambiguous AS a_ambiguous, b.ambiguous AS b_ambiguous,
         coalesce(a.is_cut, false) OR coalesce(b.is_cut, false) AS is_cut,
         b.centre - a.centre AS difference,
         sqrt(a.error + b.error) AS error,
@@ -249,9 +210,7 @@ bounded AS (
     FROM judged
 )
 SELECT
-    statistic,
-    a_ns,
-    b_ns,
+    statistic, a_ns, b_ns,
     CASE WHEN a_ns > 0 THEN round(100.0 * (b_ns - a_ns) / a_ns, 3) END AS change_percent,
     CASE WHEN reason IS NULL THEN round(low, 3) END AS low_percent,
     CASE WHEN reason IS NULL THEN round(high, 3) END AS high_percent,
@@ -273,18 +232,10 @@ SELECT
         WHEN reason IS NULL AND is_log THEN round(a_ns * high / 100)
         WHEN reason IS NULL THEN round(difference + off)
     END::BIGINT AS high_ns,
-    a_count,
-    b_count,
-    a_flows,
-    b_flows,
+    a_count, b_count, a_flows, b_flows,
     round(a_share, 4) AS a_share,
     round(b_share, 4) AS b_share,
-    a_loss_affected,
-    b_loss_affected,
-    a_ambiguous,
-    b_ambiguous,
-    is_cut,
-    subject
+    a_loss_affected, b_loss_affected, a_ambiguous, b_ambiguous, is_cut, subject
 FROM bounded
 ORDER BY
     subject, list_position(['median', 'mean', 'p95', 'p99', 'max'], statistic)

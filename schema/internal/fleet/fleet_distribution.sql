@@ -1,22 +1,11 @@
--- name: internal.fleet_distribution
--- title: How measured times are distributed
 -- description: Counts of durations and latencies in buckets whose limits grow by 2 %. Of several
 --     runs the counts of a bucket are added; a quantile of the sum is off by less than 1 % of its
 --     value. Bucket b > 0 holds times above 1.02^(b-2) ns up to 1.02^(b-1) ns, for which
 --     2 / 2.02 * 1.02^(b-1) ns stands; bucket 0 holds zero, -b the times below zero.
 -- grain: one row per measure, node, callback or topic, and bucket
--- column: run_id BIGINT  Run
--- column: measure VARCHAR  'callback_duration', 'callback_period' (from one start to the next),
---     'callback_wait' (as waits has it) or 'transport_latency' (publication to take)
--- column: node VARCHAR  Node of the callback, or the one that received
--- column: subject VARCHAR  What triggers the callback, or the topic
--- column: is_internal BOOLEAN  Infrastructure of ROS
--- column: bucket BIGINT  Bucket of the times, in their order
--- column: count BIGINT  Times in it
 WITH instance AS (
     SELECT
-        run_id,
-        callback_id,
+        run_id, callback_id,
         end_ns - start_ns AS duration_ns,
         start_ns - lag(start_ns) OVER (
             PARTITION BY callback_id ORDER BY start_ns, callback_instance_id
@@ -25,11 +14,9 @@ WITH instance AS (
     WHERE list_contains($runs, run_id)
 ),
 of_callback AS (
-    SELECT run_id, 'callback_duration' AS measure, callback_id, duration_ns AS time_ns
-    FROM instance
+    SELECT run_id, 'callback_duration' AS measure, callback_id, duration_ns AS time_ns FROM instance
     UNION ALL
-    SELECT run_id, 'callback_period', callback_id, period_ns
-    FROM instance
+    SELECT run_id, 'callback_period', callback_id, period_ns FROM instance
     UNION ALL
     SELECT run_id, 'callback_wait', callback_id, wait_ns
     FROM main.executor_wait
@@ -55,11 +42,7 @@ measured AS (
     WHERE list_contains($runs, t.run_id) AND t.method <> 'callback_only'
 )
 SELECT
-    run_id,
-    measure,
-    node,
-    subject,
-    is_internal,
+    run_id, measure, node, subject, is_internal,
     CASE
         WHEN time_ns = 0 THEN 0
         ELSE sign(time_ns) * (1 + ceil(ln(abs(time_ns)) / ln(1.02)))::BIGINT

@@ -1,4 +1,3 @@
--- name: internal.fleet_flow
 -- title: Flows of every path, one by one
 -- description: Rows of main.end_to_end with its defaults (from the start of a callback to the end
 --     of one), each with its path. The query e2e-latency summarises these rows for a run. The rows
@@ -26,23 +25,9 @@
 -- column: is_ambiguous BOOLEAN  It passes a link that may be another one (a candidate_count above
 --     1)
 SELECT
-    e.run_id,
-    p.path,
-    e.path_id,
-    e.root_kind,
-    e.root_id,
-    e.root_ns,
-    e.take_id,
-    e.sink_event,
-    e.sink_ns,
-    e.latency_ns,
-    e.status,
-    e.reason,
-    e.is_first,
-    e.is_last,
-    e.is_newest,
-    e.is_loss_affected,
-    e.is_ambiguous
+    e.run_id, p.path, e.path_id, e.root_kind, e.root_id, e.root_ns, e.take_id, e.sink_event,
+    e.sink_ns, e.latency_ns, e.status, e.reason, e.is_first, e.is_last, e.is_newest,
+    e.is_loss_affected, e.is_ambiguous
 FROM main.end_to_end($runs) AS e
 JOIN main.flow_path($runs, only_paths := true) AS p ON e.path_id = p.path_id
 ORDER BY

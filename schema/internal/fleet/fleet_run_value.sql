@@ -1,35 +1,13 @@
--- name: internal.fleet_run_value
--- title: What each run of two sides takes on each path
 -- description: Statistics of the latency of every path in every run. Reads `flow` and `e2e_latency`
 --     of a lake, and `sided`: the runs (run), the side of each (side, 'a' or 'b') and what it is a
 --     sample of (unit): itself, or the robot that made it, say.
 -- grain: one row per run, path and statistic; paths of one text in a run count together
 -- param: case VARCHAR  'first' or 'last' arrival of each root, 'newest' root of each arrival, or
 --     'every_pair'
--- column: side VARCHAR  'a' or 'b'
--- column: unit VARCHAR  What the run is a sample of
--- column: run VARCHAR  Key of the run
--- column: subject VARCHAR  Nodes and topics of the path
--- column: statistic VARCHAR  'median', 'mean', 'p95', 'p99' or 'max'
--- column: value_ns BIGINT [ns]  Its value in the run; NULL: no flow of it was measured
--- column: is_enough BOOLEAN  At least 20 values in the run, and five beyond the quantile
--- column: number BIGINT  Values of the run
--- column: roots BIGINT  Roots, without those not connected or cut by the recording
--- column: reached BIGINT  Those of them that reached the end
--- column: loss_affected BIGINT  Those of them that have a gap of a trace in their time
--- column: ambiguous BIGINT  Values of flows that pass a link that may be another one
--- column: is_cut BOOLEAN  Paths of the run were left out beyond the limits
-WITH cut AS (
-    SELECT run, bool_or(is_cut) AS is_cut
-    FROM e2e_latency
-    GROUP BY run
-),
+WITH cut AS (SELECT run, bool_or(is_cut) AS is_cut FROM e2e_latency GROUP BY run),
 measured AS (
     SELECT
-        s.side,
-        s.unit,
-        f.run,
-        f.path AS subject,
+        s.side, s.unit, f.run, f.path AS subject,
         count(value_ns) AS number,
         quantile_disc(value_ns, [0.5, 0.95, 0.99]) AS quantiles,
         avg(value_ns) AS mean_ns,
@@ -40,11 +18,7 @@ measured AS (
         count(value_ns) FILTER (f.is_ambiguous) AS ambiguous
     FROM (
         SELECT
-            run,
-            path,
-            status,
-            is_loss_affected,
-            is_ambiguous,
+            run, path, status, is_loss_affected, is_ambiguous,
             is_first IS NOT false
             AND status NOT IN ('not_connected', 'cut_by_recording') AS is_root,
             CASE
@@ -70,18 +44,9 @@ value AS (
     FROM measured
 )
 SELECT
-    v.side,
-    v.unit,
-    v.run,
-    v.subject,
-    v.statistic,
-    v.value_ns,
+    v.side, v.unit, v.run, v.subject, v.statistic, v.value_ns,
     v.number >= 20 AND v.number * (1 - v.quantile) >= 5 - 1e-9 AS is_enough,
-    v.number,
-    v.roots,
-    v.reached,
-    v.loss_affected,
-    v.ambiguous,
+    v.number, v.roots, v.reached, v.loss_affected, v.ambiguous,
     coalesce(c.is_cut, false) AS is_cut
 FROM value AS v
 LEFT JOIN cut AS c ON v.run = c.run

@@ -1,12 +1,8 @@
--- name: internal.run_identity
--- title: Key of a run
 -- description: What tells a run from others wherever it was read: the identity of its packets, as
 --     the database knows packets again, put together to a hash of 20 hexadecimal digits.
 -- grain: one row
 -- param: runs BIGINT[]  One run
--- column: run VARCHAR  Key of the run; NULL: it has no packets
-SELECT
-    left(sha256(string_agg(packet, chr(10) ORDER BY packet)), 20) AS run
+SELECT left(sha256(string_agg(packet, chr(10) ORDER BY packet)), 20) AS run
 FROM (
     SELECT DISTINCT
         concat_ws(

@@ -1,4 +1,3 @@
--- name: internal.flow_begin
 -- title: Where a flow begins
 -- description: The first publication of a topic, or what a node did first, at or after a time. A
 --     topic and a node may have the same name: then it means the topic. There is always a row:

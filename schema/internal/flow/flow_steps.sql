@@ -1,5 +1,3 @@
--- name: internal.flow_steps
--- title: Steps of a flow
 -- description: The steps of `main.flow_step`, with how long the executor was busy before the
 --     callbacks of takes and requests, and when the thread went on after a publication
 --     (until_ns): writing the message comes after the last event of the call, so that it took until
@@ -33,8 +31,7 @@ sent AS (
     WHERE publication_id IN (SELECT id FROM step WHERE kind = 'publication')
 ),
 next AS (
-    SELECT run_id, thread_id, start_event_id AS event_id, start_ns AS at_ns
-    FROM store.publication
+    SELECT run_id, thread_id, start_event_id AS event_id, start_ns AS at_ns FROM store.publication
     UNION ALL
     SELECT run_id, thread_id, start_event_id, taken_ns
     FROM store.take

@@ -1,4 +1,3 @@
--- name: internal.longest_take
 -- title: The take that a message is about
 -- description: Of a take itself, of a publication the take with the longest latency, of a callback
 --     instance what it took.

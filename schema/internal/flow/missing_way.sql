@@ -1,5 +1,3 @@
--- name: internal.missing_way
--- title: Why no path leads from one place to another
 -- description: Where flows that start at one place end, and where those begin that arrive at
 --     another, if no path leads from the one to the other. Of the nodes where flows end, those
 --     count that publish towards the other place. If there are none, those count where a link may
@@ -7,13 +5,6 @@
 -- grain: one row, or none if there is a path
 -- param: from VARCHAR  Topics or nodes where flows start: names or globs, separated by commas
 -- param: to VARCHAR  Topics or nodes where they end, in the same form
--- column: last VARCHAR  Nodes where flows from the one place end; NULL: nothing was received
--- column: last_topics VARCHAR  Topics on which they get there
--- column: first VARCHAR  Nodes where flows to the other place begin; NULL: nothing was received
---     there
--- column: is_joint BOOLEAN  The nodes where flows end publish towards the other place
--- column: is_dead_end BOOLEAN  A link may be missing there
--- column: is_sink BOOLEAN  The nodes where flows end publish nothing
 WITH RECURSIVE start_place AS MATERIALIZED (FROM derive.place($runs, $from)),
 end_place AS MATERIALIZED (FROM derive.place($runs, $to)),
 hop AS MATERIALIZED (

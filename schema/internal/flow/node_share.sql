@@ -1,21 +1,7 @@
--- name: internal.node_share
--- title: Time by node, on a path
 -- description: The share of each node in the time of one path, and the largest of its parts.
 -- grain: one row per node
 -- param: path VARCHAR  The path
--- column: node VARCHAR [node]  Node, or 'between nodes'
--- column: share DOUBLE [share]  Part of the time of the path
--- column: total_ns BIGINT [ns]  Time of all flows
--- column: part VARCHAR  The part that took longest
--- column: what VARCHAR  Its callback or topic
--- column: median_ns BIGINT [ns]  Its median
--- column: max_ns BIGINT [ns]  Its maximum
-WITH part AS (
-    SELECT
-        *,
-        row_number() OVER () AS place
-    FROM breakdown
-),
+WITH part AS (SELECT *, row_number() OVER () AS place FROM breakdown),
 longest AS (
     SELECT
         *,

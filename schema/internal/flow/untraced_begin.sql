@@ -1,10 +1,6 @@
--- name: internal.untraced_begin
--- title: Where flows of publishers that are not traced begin
 -- description: Topics with such messages, and whether their flows begin with the stamp of each
 --     message, or where its clock may be another one, with its take.
 -- grain: one row per topic
--- column: topic_name VARCHAR [topic]  Topic
--- column: is_stamped BOOLEAN  Flows begin with the stamp; NULL: some do
 SELECT
     s.topic_name,
     CASE

@@ -1,5 +1,3 @@
--- name: internal.known_packet
--- title: Runs with packets that were just read
 -- description: Runs of the database that hold packets of `packet_batch`, which were just read.
 -- grain: one row per such run
 SELECT DISTINCT r.run_id, r.name

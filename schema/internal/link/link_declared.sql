@@ -1,15 +1,8 @@
--- name: internal.link_declared
--- title: Links that the trace declares
 -- description: The annotations of a run that its trace declares, with their endpoints: those among
 --     a file are not stored again.
 -- grain: one row per annotation
--- column: kind VARCHAR  Kind of the link
--- column: process_id BIGINT  Process that declares it
--- column: inputs BIGINT[]  Subscriptions, in order; NULL: none
--- column: outputs BIGINT[]  Publishers, in order; NULL: none
 SELECT
-    a.kind,
-    a.process_id,
+    a.kind, a.process_id,
     (
         SELECT list(i.subscription_id ORDER BY i.subscription_id)
         FROM store.annotation_input AS i

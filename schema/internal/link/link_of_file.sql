@@ -1,17 +1,6 @@
--- name: internal.link_of_file
--- title: Links that a file declares
 -- description: The annotations of a run that a file declared, as an entry of a file has them: what
 --     is suggested stands beside them.
 -- grain: one row per annotation of a file
--- column: kind VARCHAR  Kind of the link
--- column: node VARCHAR  Node that publishes
--- column: inputs VARCHAR[]  Topics of its inputs
--- column: outputs VARCHAR[]  Topics of its outputs
--- column: inputs_of VARCHAR  Node that receives the inputs for it; NULL: itself
--- column: queue_depth BIGINT  Of a queue: most messages that wait in it
--- column: pid INTEGER  Process id of the node
--- column: host VARCHAR  Its host
--- column: is_name_repeated BOOLEAN  Several nodes of the run have this name
 WITH input AS (
     SELECT
         i.annotation_id, list(DISTINCT s.topic_name ORDER BY s.topic_name) AS topics,
@@ -36,15 +25,9 @@ named AS (
     WHERE run_id = $run_id
 )
 SELECT
-    a.kind,
-    n.full_name AS node,
-    i.topics AS inputs,
-    o.topics AS outputs,
+    a.kind, n.full_name AS node, i.topics AS inputs, o.topics AS outputs,
     CASE WHEN i.node_id <> o.node_id THEN r.full_name END AS inputs_of,
-    a.queue_depth,
-    p.pid,
-    h.hostname AS host,
-    n.is_name_repeated
+    a.queue_depth, p.pid, h.hostname AS host, n.is_name_repeated
 FROM store.annotation AS a
 JOIN input AS i ON a.annotation_id = i.annotation_id
 JOIN output AS o ON a.annotation_id = o.annotation_id

@@ -1,12 +1,6 @@
--- name: internal.link_without_effect
--- title: Declared links that lead to nothing
 -- description: The indirect links that a file declared for a run and that no message took, with the
 --     reason.
 -- grain: one row per such annotation
--- column: kind VARCHAR  Kind of the link
--- column: inputs VARCHAR  Topics of its inputs
--- column: outputs VARCHAR  Topics of its outputs
--- column: reason VARCHAR  Why no message took it
 WITH declared AS (
     SELECT a.annotation_id, a.kind
     FROM store.annotation AS a
@@ -38,9 +32,7 @@ output AS (
     GROUP BY o.annotation_id
 )
 SELECT
-    d.kind,
-    i.topics AS inputs,
-    o.topics AS outputs,
+    d.kind, i.topics AS inputs, o.topics AS outputs,
     CASE
         WHEN i.first_event_id IS NULL THEN printf('no message on %s was taken', i.topics)
         WHEN o.number = 0 THEN printf('nothing was published on %s', o.topics)

@@ -1,13 +1,6 @@
--- name: internal.topic_of_file
--- title: Topics that a file of links names, or could name
 -- description: What a file named for a run, and topics that still have no name, as entries of a
 --     file have them: both stand in the file of suggestions.
 -- grain: one row per named publisher or subscription, and per unnamed topic
--- column: name VARCHAR  Topic; NULL: it has no name
--- column: entry VARCHAR  What the entry knows it by
--- column: publishers VARCHAR  Nodes that publish on a topic without a name
--- column: subscribers VARCHAR  Nodes that take its messages
--- column: message_count BIGINT  Its messages
 SELECT topic_name AS name, entry, NULL AS publishers, NULL AS subscribers, NULL AS message_count
 FROM derive.unnamed_endpoint($run_id)
 WHERE is_topic_declared

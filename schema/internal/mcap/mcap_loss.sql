@@ -1,10 +1,5 @@
--- name: internal.mcap_loss
--- title: Losses of an MCAP file
 -- description: Messages that a subscription did not get, though it was connected.
 -- grain: one row per publication and subscription that did not get it
--- column: at_ns BIGINT [epoch ns]  When it was published
--- column: node VARCHAR [node]  Node that did not get it
--- column: message VARCHAR  What became of it, in words
 SELECT
     b.start_ns AS at_ns,
     main.node_label(n.full_name, o.name, o.pid) AS node,

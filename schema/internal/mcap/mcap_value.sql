@@ -1,5 +1,3 @@
--- name: internal.mcap_value
--- title: Values of an MCAP file
 -- description: Measured values as messages, in the order of time: latency of paths by the start of
 --     the flow (first arrivals), age of the data at their ends by the output, latency from
 --     publication to take of topics by the take, duration of callbacks and the time for which
@@ -7,9 +5,6 @@
 --     several have them, their identity comes behind. Flows that pass a link that may be another
 --     one are a series of their own, /ambiguous.
 -- grain: one row per value
--- column: topic VARCHAR  Topic in the file; characters that no topic of ROS has are underscores
--- column: at_ns BIGINT [epoch ns]  When
--- column: value_ms DOUBLE [ms]  The value
 WITH flow AS MATERIALIZED (
     SELECT
         path_id, root_ns, sink_ns, take_id, latency_ns, is_first, is_newest,

@@ -1,5 +1,3 @@
--- name: internal.otlp_flow
--- title: Flows as traces
 -- description: What belongs to flows that reached the end of their paths: callback instances,
 --     publications, takes, and the requests and responses between them.
 -- grain: one row per vertex
@@ -10,12 +8,10 @@
 -- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
 -- param: without VARCHAR = NULL  Only flows through none of these
 -- param: slowest BIGINT = NULL  So many of the slowest flows; NULL: all
--- column: key BIGINT  Its key, as derive.vertex_key computes it
 WITH path AS (
     SELECT path_id
     FROM main.flow_path($runs, $from, $to, only_paths := true)
-    WHERE ($via IS NOT NULL OR $without IS NOT NULL)
-        AND main.path_visits(path, $via, $without)
+    WHERE ($via IS NOT NULL OR $without IS NOT NULL) AND main.path_visits(path, $via, $without)
 ),
 part AS MATERIALIZED (
     SELECT root_kind, root_id, take_id, callback_instance_id, publication_id
@@ -48,5 +44,4 @@ between_them AS (
 )
 SELECT derive.vertex_key(kind, id)::BIGINT AS key FROM passed
 UNION
-SELECT derive.vertex_key(kind, id)::BIGINT FROM between_them
-ORDER BY key
+SELECT derive.vertex_key(kind, id)::BIGINT FROM between_them ORDER BY key

@@ -1,5 +1,3 @@
--- name: internal.otlp_request
--- title: A request of OTLP/JSON
 -- description: The spans of a batch, by resource, as one text: 64-bit integers are text in it, ids
 --     are hexadecimal. Attributes are those of the conventions for messaging, remote calls, threads
 --     and code; what these have no word for begins with 'msgflow.'.
@@ -7,7 +5,6 @@
 -- param: batch BIGINT  Number of the request
 -- param: run_name VARCHAR  Name of the run
 -- param: version VARCHAR  Version of msgflow
--- column: json VARCHAR  The request
 WITH span AS (
     SELECT
         *,

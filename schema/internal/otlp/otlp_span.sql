@@ -1,5 +1,3 @@
--- name: internal.otlp_span
--- title: Spans of OpenTelemetry
 -- description: Callback instances, publications, takes, requests and responses as spans. What
 --     caused a thing is its parent; of several causes that is the callback that it happened in, or
 --     else the latest. The others are links. A trace is a span without a parent and all that
@@ -11,33 +9,6 @@
 --     window
 -- param: identity VARCHAR = ''  What tells the run from others; ids are computed from it
 -- param: at_once BIGINT = 2000  Most spans of a request
--- column: batch BIGINT  Number of the request that has the span, a line of the file
--- column: trace_id VARCHAR  Identity of the trace, 32 hexadecimal digits
--- column: span_id VARCHAR  Identity of the span, 16 hexadecimal digits
--- column: parent_span_id VARCHAR  Its parent; empty: none
--- column: kind VARCHAR  'callback_instance', 'publication', 'take', 'request' or 'response'
--- column: id BIGINT  What it is of
--- column: name VARCHAR  What OpenTelemetry calls it: operation and topic
--- column: span_kind INTEGER  1 internal, 2 server, 3 client, 4 producer, 5 consumer
--- column: from_ns BIGINT [epoch ns]  Begin; of a take the end of the publication
--- column: to_ns BIGINT [epoch ns]  End, at least 1 ns after the begin: Jaeger calls a span without
---     a duration a damaged one
--- column: latency_ns BIGINT [ns]  Of a take: from the publication; negative where clocks are apart
--- column: node VARCHAR [node]  Its node
--- column: host VARCHAR [host]  Host of its process
--- column: process VARCHAR  Name of its process
--- column: pid INTEGER  Identity of its process
--- column: thread VARCHAR  Name of its thread
--- column: tid INTEGER  Identity of its thread
--- column: topic VARCHAR [topic]  Topic of its message
--- column: service VARCHAR  Service of the request, response or callback
--- column: symbol VARCHAR  Function of the callback
--- column: cause VARCHAR  Kind of the link from its parent
--- column: candidate_count BIGINT  How many causes are possible; NULL: one
--- column: not_delivered VARCHAR  Subscriptions that did not get the message, and why
--- column: link_trace_ids VARCHAR[]  Traces of its further causes
--- column: link_span_ids VARCHAR[]  Spans of these, in the same order
--- column: link_causes VARCHAR[]  Kinds of these links, in the same order
 WITH RECURSIVE place AS (
     SELECT 'callback_instance' AS kind, i.callback_instance_id AS id, i.start_ns AS at_ns
     FROM main.callback_instance AS i
@@ -172,11 +143,7 @@ span AS (
 SELECT
     (row_number() OVER (ORDER BY o.start_ns, s.root_key, s.start_ns, s.key) - 1) // $at_once
         AS batch,
-    s.trace_id,
-    s.span_id,
-    p.span_id AS parent_span_id,
-    s.kind,
-    s.id,
+    s.trace_id, s.span_id, p.span_id AS parent_span_id, s.kind, s.id,
     CASE
         WHEN s.kind = 'publication' THEN 'publish ' || s.label
         WHEN s.kind = 'callback_instance' AND s.trigger <> 'subscription' THEN s.label
@@ -194,20 +161,9 @@ SELECT
         ELSE s.start_ns END AS from_ns,
     greatest(s.end_ns, from_ns + 1) AS to_ns,
     CASE WHEN s.kind = 'take' THEN s.start_ns - u.end_ns END AS latency_ns,
-    s.node,
-    h.hostname AS host,
-    e.name AS process,
-    e.pid,
-    t.name AS thread,
-    t.tid,
-    s.topic_name AS topic,
-    s.service,
-    s.symbol,
-    s.link_kind AS cause,
-    a.candidate_count,
-    f.not_delivered,
-    w.trace_ids AS link_trace_ids,
-    w.span_ids AS link_span_ids,
+    s.node, h.hostname AS host, e.name AS process, e.pid, t.name AS thread, t.tid,
+    s.topic_name AS topic, s.service, s.symbol, s.link_kind AS cause, a.candidate_count,
+    f.not_delivered, w.trace_ids AS link_trace_ids, w.span_ids AS link_span_ids,
     w.causes AS link_causes
 FROM span AS s
 JOIN described AS o ON s.root_key = o.key

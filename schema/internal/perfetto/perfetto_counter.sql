@@ -1,11 +1,5 @@
--- name: internal.perfetto_counter
--- title: Counters in Perfetto
 -- description: The tracks of rates and of queues.
 -- grain: one row per publisher and subscription
--- column: track BIGINT  Its track
--- column: parent BIGINT  Track of its process
--- column: name VARCHAR  What Perfetto calls it
--- column: unit VARCHAR  What its values are in
 SELECT publisher_id * 8 + 4 AS track, process_id * 8 + 1 AS parent,
     'rate of ' || coalesce(topic_name, '?') AS name, 'Hz' AS unit
 FROM main.publisher

@@ -1,13 +1,5 @@
--- name: internal.perfetto_gap
--- title: Gaps in Perfetto
 -- description: Gaps of a host, those that touch as one: slices of a track are disjoint or nested.
 -- grain: one row per gap of a host
--- column: track BIGINT  Its track
--- column: track_name VARCHAR  What Perfetto calls the track
--- column: name VARCHAR  What it calls the gap
--- column: start_ns BIGINT [epoch ns]  Begin
--- column: end_ns BIGINT [epoch ns]  End
--- column: event_count BIGINT  Events lost, where the tracer counted them
 WITH gap AS (
     SELECT
         t.host_id, g.kind, g.event_count,

@@ -1,11 +1,6 @@
--- name: internal.perfetto_name
--- title: Names in Perfetto
 -- description: Names of slices. A slice refers to its name by code and id; id 0 is what is not
 --     known. A client has two names: of its requests, and of calls that a callback waited for.
 -- grain: one row per name
--- column: code INTEGER  What kind of slice has it
--- column: id BIGINT  Of the callback, publisher, subscription, client, service or activity
--- column: name VARCHAR  The name
 SELECT 0 AS code, callback_id AS id, node || ' ' || label AS name
 FROM main.callback_label
 WHERE run_id = $run_id

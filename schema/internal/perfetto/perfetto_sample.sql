@@ -1,12 +1,5 @@
--- name: internal.perfetto_sample
--- title: Samples of stacks in Perfetto
 -- description: Samples of what threads ran, with their stacks.
 -- grain: one row per sample of a thread that has a track
--- column: at_ns BIGINT [epoch ns]  When
--- column: pid BIGINT  Pid that Perfetto knows the process by
--- column: tid BIGINT  Tid that Perfetto knows the thread by
--- column: cpu INTEGER  CPU that it ran on
--- column: stack_id BIGINT  The stack
 SELECT s.at_ns, t.pid, t.tid, coalesce(s.cpu, 0) AS cpu, s.stack_id
 FROM main.stack_sample AS s
 JOIN perfetto_thread AS t ON s.thread_id * 8 + 2 = t.track

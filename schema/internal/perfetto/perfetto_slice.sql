@@ -1,26 +1,10 @@
--- name: internal.perfetto_slice
--- title: Slices in Perfetto
 -- description: Begins and ends of slices of threads and of executors, in the order of each track,
 --     with the links between them. A request whose response a callback waited for lasts until then.
 --     A link begins at the last and ends at the first moment of a
 --     request or response that was traced.
 -- grain: one row per begin and end of a slice, and per moment
--- column: track BIGINT  Its track
--- column: at_ns BIGINT [epoch ns]  When
--- column: rank INTEGER  0 an end, 1 a begin, 2 a moment
--- column: name BIGINT  Number of its name; NULL: an end
--- column: code INTEGER  What kind of slice it is
--- column: id BIGINT  What it is of
--- column: symbol_id BIGINT  Callback whose symbol it has; NULL: none
--- column: candidate_count BIGINT  How many causes of it are possible; NULL: one
--- column: queue_ns BIGINT [ns]  Of a request that a callback waited for: until the service began
--- column: served_ns BIGINT [ns]  Of the same: the service's callback, until it answered
--- column: outgoing UBIGINT[]  Links that begin there
--- column: incoming UBIGINT[]  Links that end there
 WITH waited AS MATERIALIZED (
-    SELECT request_id, returned_ns, queue_ns, served_ns
-    FROM main.waited_call
-    WHERE run_id = $run_id
+    SELECT request_id, returned_ns, queue_ns, served_ns FROM main.waited_call WHERE run_id = $run_id
 ),
 slice AS MATERIALIZED (
     SELECT
@@ -78,8 +62,7 @@ link AS (
             WHEN 'take' THEN 2 WHEN 'request' THEN CASE WHEN o.sent_ns IS NULL THEN 4 ELSE 3 END
             ELSE CASE WHEN r.sent_ns IS NULL THEN 6 ELSE 5 END
         END AS to_code,
-        l.to_id,
-        l.link_kind
+        l.to_id, l.link_kind
     FROM main.flow_edge AS l
     LEFT JOIN main.request AS q ON l.from_kind = 'request' AND l.from_id = q.request_id
     LEFT JOIN main.response AS a ON l.from_kind = 'response' AND l.from_id = a.response_id
@@ -132,9 +115,7 @@ event AS (
         end_ns AS far_ns, code, object_id, id, symbol_id
     FROM drawn
     UNION ALL
-    SELECT track, end_ns, 0, start_ns, code, NULL, id, NULL
-    FROM drawn
-    WHERE end_ns > start_ns
+    SELECT track, end_ns, 0, start_ns, code, NULL, id, NULL FROM drawn WHERE end_ns > start_ns
 )
 SELECT
     e.track, e.at_ns, e.rank, e.object_id * 8 + e.code + 1 AS name, e.code, e.id,

@@ -1,9 +1,5 @@
--- name: internal.perfetto_stack
--- title: Stacks in Perfetto
 -- description: The stacks of samples, the outermost call first.
 -- grain: one row per stack
--- column: stack_id BIGINT  The stack
--- column: frames BIGINT[]  Its functions
 SELECT stack_id, list(stack_frame_id ORDER BY position) AS frames
 FROM main.stack_call
 WHERE run_id = $run_id

@@ -1,17 +1,6 @@
--- name: internal.perfetto_state
--- title: Scheduling in Perfetto
 -- description: States of threads, as the kernel recorded them, and what of that ran on which core.
 --     Slices of a track are disjoint.
 -- grain: one row per state of a thread, and per stretch in which a thread ran on a core
--- column: track BIGINT  Its track
--- column: parent BIGINT  Track of its thread; NULL: of a core
--- column: track_name VARCHAR  What Perfetto calls the track
--- column: name VARCHAR  The state, and what took the CPU; of a core the thread
--- column: start_ns BIGINT [epoch ns]  Begin
--- column: end_ns BIGINT [epoch ns]  End
--- column: cpu INTEGER  CPU it ran on, or left
--- column: priority INTEGER  Priority of the thread
--- column: woken_by VARCHAR  What ended the sleep
 WITH state AS MATERIALIZED (
     SELECT
         s.thread_id, s.state, s.start_ns, s.end_ns, s.cpu, s.priority, s.waker_kind, p.host_id,
@@ -35,14 +24,8 @@ SELECT
     thread_id * 8 + 2 AS parent,
     'kernel' AS track_name,
     CASE WHEN state = 'preempted' THEN concat_ws(' by ', state, who) ELSE state END AS name,
-    start_ns,
-    end_ns,
-    cpu,
-    priority,
-    CASE
-        WHEN waker_kind = 'thread' THEN who
-        ELSE waker_kind
-    END AS woken_by
+    start_ns, end_ns, cpu, priority,
+    CASE WHEN waker_kind = 'thread' THEN who ELSE waker_kind END AS woken_by
 FROM state
 UNION ALL
 -- Linux has at most 8192 CPUs.

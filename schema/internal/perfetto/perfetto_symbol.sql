@@ -1,9 +1,5 @@
--- name: internal.perfetto_symbol
--- title: Symbols in Perfetto
 -- description: Symbols of callbacks, which slices refer to by number.
 -- grain: one row per callback with a symbol
--- column: id BIGINT  Callback
--- column: name VARCHAR  Its symbol
 SELECT callback_id AS id, symbol AS name
 FROM main.callback
 WHERE run_id = $run_id AND symbol IS NOT NULL

@@ -1,12 +1,6 @@
--- name: internal.perfetto_value
--- title: Values of counters in Perfetto
 -- description: The rate of each publisher, from the time since its publication before; and how many
 --     messages of each subscription were published and not yet taken, of those that it took later.
 -- grain: one row per value
--- column: track BIGINT  Track of the counter
--- column: at_ns BIGINT [epoch ns]  When
--- column: value DOUBLE  In the unit of the track
--- column: place BIGINT  Order of the values of one moment
 WITH rate AS (
     SELECT
         publisher_id * 8 + 4 AS track, start_ns AS at_ns,
@@ -34,12 +28,9 @@ queue AS (
             PARTITION BY subscription_id ORDER BY at_ns, step DESC, take_id
             ROWS UNBOUNDED PRECEDING
         )::DOUBLE AS value,
-        row_number() OVER (
-            PARTITION BY subscription_id ORDER BY at_ns, step DESC, take_id
-        ) AS place
+        row_number() OVER (PARTITION BY subscription_id ORDER BY at_ns, step DESC, take_id) AS place
     FROM step
 )
 SELECT track, at_ns, value, 0 AS place FROM rate WHERE value IS NOT NULL
 UNION ALL
-SELECT track, at_ns, value, place FROM queue
-ORDER BY track, at_ns, place
+SELECT track, at_ns, value, place FROM queue ORDER BY track, at_ns, place

@@ -1,12 +1,7 @@
--- name: internal.callback_function
--- title: Functions of a callback
 -- description: The three functions in which a callback was most of its CPU time.
 -- grain: one row per function
 -- param: node VARCHAR  Its node
 -- param: callback VARCHAR  What triggers it
--- column: function VARCHAR  The function
--- column: self_share DOUBLE [share]  Part of the samples of the callback in which it ran
--- column: all_samples BIGINT  Samples of the callback
 WITH sample AS (
     SELECT 1 AS group_id, s.stack_id, s.cpu_ns
     FROM main.stack_sample AS s

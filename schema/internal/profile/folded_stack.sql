@@ -1,11 +1,7 @@
--- name: internal.folded_stack
--- title: Stacks of a flame graph
 -- description: Stacks that samples saw, below their node and callback, with how often: as tools for
 --     flame graphs read them, the outermost call first.
 -- grain: one row per node, callback and stack
 -- param: instances BIGINT[] = NULL  Only samples of these callback instances
--- column: stack VARCHAR  Node, callback and functions, with semicolons between
--- column: samples BIGINT  How many samples
 WITH sample AS (
     SELECT
         s.stack_id, i.callback_id, CASE WHEN i.callback_id IS NULL THEN s.process_id END

@@ -1,16 +1,9 @@
--- name: internal.worst_callback
--- title: The longest run of a callback
 -- description: Of the instances of a callback that ended, the longest that began in the window.
 -- grain: one row, or none
 -- param: key BIGINT  Callback
--- column: duration_ns BIGINT [ns]  How long it took
--- column: at_ns BIGINT [epoch ns]  When it began
--- column: id BIGINT  Its identity
--- column: kind VARCHAR  What it is: 'callback_instance'
 SELECT
     end_ns - start_ns AS duration_ns,
-    start_ns AS at_ns,
-    callback_instance_id AS id,
+    start_ns AS at_ns, callback_instance_id AS id,
     'callback_instance' AS kind
 FROM main.callback_instance
 WHERE callback_id = $key AND end_ns IS NOT NULL AND start_ns >= $start_ns AND start_ns < $end_ns

@@ -1,16 +1,8 @@
--- name: internal.worst_late_call
--- title: The latest call of a timer
 -- description: Of the calls of a timer in the window, the one that came latest after it was due.
 -- grain: one row, or none
 -- param: key BIGINT  Its callback
--- column: duration_ns BIGINT [ns]  How long it took
--- column: at_ns BIGINT [epoch ns]  When it began
--- column: id BIGINT  Its identity
--- column: kind VARCHAR  What it is: 'callback_instance'
 SELECT
-    wait_ns AS duration_ns,
-    start_ns AS at_ns,
-    callback_instance_id AS id,
+    wait_ns AS duration_ns, start_ns AS at_ns, callback_instance_id AS id,
     'callback_instance' AS kind
 FROM main.executor_wait
 WHERE callback_id = $key AND since = 'timer' AND NOT is_loss_affected

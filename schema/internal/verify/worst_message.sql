@@ -1,13 +1,7 @@
--- name: internal.worst_message
--- title: The message that took longest
 -- description: Of the messages that a subscription took in the window, the one that was longest on
 --     its way.
 -- grain: one row, or none
 -- param: key BIGINT  Subscription that took it
--- column: duration_ns BIGINT [ns]  How long it took
--- column: at_ns BIGINT [epoch ns]  When it began
--- column: id BIGINT  Its identity
--- column: kind VARCHAR  What it is: 'take'
 SELECT l.latency_ns AS duration_ns, t.taken_ns AS at_ns, t.take_id AS id, 'take' AS kind
 FROM main.link_transport AS l
 JOIN main.take AS t ON l.take_id = t.take_id

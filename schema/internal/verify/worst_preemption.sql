@@ -1,17 +1,9 @@
--- name: internal.worst_preemption
--- title: The run of a callback that lost the CPU for longest
 -- description: Of the instances of a callback that began in the window, the one in which other
 --     threads had the CPU for longest.
 -- grain: one row, or none
 -- param: key BIGINT  Callback
--- column: duration_ns BIGINT [ns]  How long it had lost the CPU
--- column: at_ns BIGINT [epoch ns]  When it began
--- column: id BIGINT  Its identity
--- column: kind VARCHAR  What it is: 'callback_instance'
 SELECT
-    s.preempted_ns AS duration_ns,
-    i.start_ns AS at_ns,
-    i.callback_instance_id AS id,
+    s.preempted_ns AS duration_ns, i.start_ns AS at_ns, i.callback_instance_id AS id,
     'callback_instance' AS kind
 FROM main.callback_schedule AS s
 JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id

@@ -1,17 +1,10 @@
--- name: internal.worst_request
--- title: The request that took longest
 -- description: Of the answered requests of a client to a service in the window, the one that was
 --     answered latest.
 -- grain: one row, or none
 -- param: key BIGINT[]  Service and client
--- column: duration_ns BIGINT [ns]  How long it took
--- column: at_ns BIGINT [epoch ns]  When it began
--- column: id BIGINT  Its identity
--- column: kind VARCHAR  What it is: 'request'
 SELECT
     p.taken_ns - q.sent_ns AS duration_ns,
-    q.sent_ns AS at_ns,
-    q.request_id AS id,
+    q.sent_ns AS at_ns, q.request_id AS id,
     'request' AS kind
 FROM main.request AS q
 JOIN main.response AS p ON q.request_id = p.request_id

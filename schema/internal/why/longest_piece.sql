@@ -1,12 +1,9 @@
--- name: internal.longest_piece
 -- title: The longest pieces of a slow flow
 -- description: Rows of critical-path: the longest pieces of one flow, in their order, and behind
 --     them the sum of all others. It has the columns of its input.
 -- grain: one row per piece
 -- param: count BIGINT  How many pieces
-WITH piece AS (
-    SELECT *, row_number() OVER () AS place FROM slow_flow
-),
+WITH piece AS (SELECT *, row_number() OVER () AS place FROM slow_flow),
 longest AS (
     SELECT *
     FROM piece

@@ -1,4 +1,3 @@
--- name: internal.open_end
 -- title: Timers that may use what their node was told before
 -- description: Likely links that are not declared (main.dead_end), from messages that a node keeps
 --     to timers of it.

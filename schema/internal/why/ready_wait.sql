@@ -1,4 +1,3 @@
--- name: internal.ready_wait
 -- title: When inputs of callbacks became ready
 -- description: What an explanation looks at twice: how long all callbacks waited, and what one flow
 --     waited for.

@@ -1,4 +1,3 @@
--- name: internal.suspect
 -- title: What makes data late, or lets them get lost
 -- description: Everything on the paths of an explanation that costs time or messages, whether it
 --     matters or not. The cost is by how much the data at the end of the path are older because of

@@ -1,4 +1,3 @@
--- name: internal.verdict
 -- title: What makes data late, the worst first
 -- description: A sentence for each culprit on the paths of an explanation. What is wrong with the
 --     recording or the system as a whole comes first, then what delays data, or loses them. If

@@ -1,4 +1,3 @@
--- name: internal.warm_up
 -- title: When the system of an explanation had warmed up
 -- description: The moment of the last of the longest latencies, if they all lie at the start. It
 --     reads the flows of an explanation.
@@ -15,5 +14,4 @@ WITH flow AS (
     WHERE status = 'reached' AND is_first AND latency_ns IS NOT NULL
     QUALIFY number >= 20
 )
-SELECT max(last_ns) AS last_ns
-FROM derive.warm_up('flow')
+SELECT max(last_ns) AS last_ns FROM derive.warm_up('flow')

@@ -1,4 +1,3 @@
--- name: internal.why_callback
 -- title: What callbacks on paths did
 -- description: How long the callbacks on the paths of an explanation ran and waited, and for what.
 --     95 % of their instances took no longer.

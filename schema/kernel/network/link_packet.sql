@@ -1,4 +1,3 @@
--- name: staging.link_packet
 -- description: Packets that were seen being sent on one clock and received on another. To find
 --     roughly how far two clocks are apart, the times of ends with equal keys are compared, of the
 --     rarest keys first. The difference that most of them agree on to within a second counts,
@@ -84,11 +83,7 @@ matched AS (
     WHERE NOT r.is_sent AND abs(r.ts_ns - s.due_ns) < 1_000_000_000
 )
 SELECT
-    m.sent_trace_id,
-    m.received_trace_id,
-    m.sent_event_id,
-    m.received_event_id,
-    m.sent_ns,
+    m.sent_trace_id, m.received_trace_id, m.sent_event_id, m.received_event_id, m.sent_ns,
     m.received_ns,
     CASE WHEN p.sequence_number IS NULL THEN 'udp' ELSE 'tcp' END AS protocol,
     CASE
@@ -102,9 +97,7 @@ SELECT
             list_transform(p.destination_address, lambda x: format('{:x}', x)), ':'
         )
     END AS destination_address,
-    p.destination_port,
-    p.identification,
-    p.sequence_number
+    p.destination_port, p.identification, p.sequence_number
 FROM matched AS m
 JOIN raw.net_dev_queue AS p ON m.sent_event_id = p.event_id
 ORDER BY m.sent_trace_id, m.sent_ns, m.received_trace_id, m.received_ns

@@ -1,4 +1,3 @@
--- name: staging.network_packet
 -- description: Packets that kernel traces saw being handed to a network device or coming from one.
 --     `key` is equal for the two ends of a packet's way and, as far as its headers allow, for no
 --     other packet: addresses, ports, the identification of the datagram; for TCP the sequence and
@@ -11,18 +10,12 @@
 -- grain: one row per packet sent or received on a host
 -- when: raw.net_dev_queue, raw.net_if_receive_skb
 WITH recorded AS (
-    SELECT *, true AS is_sent
-    FROM raw.net_dev_queue
+    SELECT *, true AS is_sent FROM raw.net_dev_queue
     UNION ALL
-    SELECT *, false
-    FROM raw.net_if_receive_skb
+    SELECT *, false FROM raw.net_if_receive_skb
 )
 SELECT
-    p.event_id,
-    t.trace_id,
-    h.clock_id,
-    p.ts_ns,
-    p.is_sent,
+    p.event_id, t.trace_id, h.clock_id, p.ts_ns, p.is_sent,
     CASE
         WHEN p.source_port IS NULL OR coalesce(p.fragment % 8192, 0) > 0 THEN NULL
         WHEN p.source_address[1] = 127 AND len(p.source_address) = 4 THEN NULL

@@ -1,4 +1,3 @@
--- name: staging.single_packet
 -- description: Packets whose key no other packet has, on the same clock and in the same direction,
 --     within two seconds before and after: a retransmission, or a number that came round again,
 --     cannot be taken for them. A key under which hosts of two clocks sent a packet is left out.

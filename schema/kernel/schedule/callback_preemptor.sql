@@ -1,4 +1,3 @@
--- name: staging.callback_preemptor
 -- description: What ran on the CPU for which callback instances waited.
 -- grain: one row per callback instance, and thread that ran meanwhile, with its priority
 -- when: staging.preemptor
@@ -10,17 +9,13 @@ WITH overlap AS (
     FROM staging.callback_state AS c
     JOIN staging.thread_state AS s ON c.state_number = s.number
     JOIN staging.preemptor AS p
-        ON s.thread_id = p.thread_id
-        AND s.start_ns
+        ON s.thread_id = p.thread_id AND s.start_ns
         = CASE s.state WHEN 'preempted' THEN p.wait_start_ns ELSE p.state_start_ns END
         AND s.state = p.state
     WHERE p.end_ns > c.start_ns AND p.start_ns < c.end_ns
 )
 SELECT
-    callback_instance_id,
-    preemptor_thread_id,
-    preemptor_other_thread_id,
-    preemptor_priority,
+    callback_instance_id, preemptor_thread_id, preemptor_other_thread_id, preemptor_priority,
     coalesce(sum(length_ns) FILTER (WHERE state = 'preempted'), 0)::BIGINT AS preempted_ns,
     coalesce(sum(length_ns) FILTER (WHERE state = 'runnable'), 0)::BIGINT AS runnable_ns
 FROM overlap

@@ -1,4 +1,3 @@
--- name: staging.callback_schedule
 -- description: How the time of callback instances divides into states of their threads.
 -- grain: one row per callback instance that ended, on a thread with known states
 -- when: staging.thread_state
@@ -49,8 +48,7 @@ interrupt AS (
 ),
 handled AS (
     SELECT
-        c.callback_instance_id,
-        i.kind,
+        c.callback_instance_id, i.kind,
         sum(least(i.end_ns, c.end_ns) - greatest(i.start_ns, c.start_ns)) AS length_ns
     FROM interrupt AS i
     JOIN staging.callback_state AS c ON i.state_number = c.state_number

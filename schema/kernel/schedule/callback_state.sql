@@ -1,4 +1,3 @@
--- name: staging.callback_state
 -- description: States of the thread during callback instances, cut to them.
 -- grain: one row per callback instance that ended and state that it overlaps
 -- when: staging.thread_state
@@ -14,17 +13,14 @@ begun AS (
 ),
 covered AS (
     SELECT
-        b.callback_instance_id,
-        b.start_ns,
-        b.end_ns,
+        b.callback_instance_id, b.start_ns, b.end_ns,
         unnest(range(coalesce(b.number, e.first_number), s.number + 1)) AS number
     FROM begun AS b
     JOIN extent AS e ON b.thread_id = e.thread_id
     ASOF JOIN staging.thread_state AS s ON b.thread_id = s.thread_id AND b.end_ns > s.start_ns
 )
 SELECT
-    c.callback_instance_id,
-    c.number AS state_number,
+    c.callback_instance_id, c.number AS state_number,
     greatest(c.start_ns, s.start_ns) AS start_ns,
     least(c.end_ns, s.end_ns) AS end_ns,
     s.start_ns > c.start_ns AS is_begin

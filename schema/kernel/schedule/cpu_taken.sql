@@ -1,4 +1,3 @@
--- name: staging.cpu_taken
 -- description: What ran on the CPU for which a thread waited, one thread after the other. What the
 --     next switch contradicts is not known. The other thread ran from `start_ns` to `end_ns`.
 -- grain: one row per wait for a CPU and stretch of time in which another thread had it
@@ -22,20 +21,12 @@ extent AS (
     GROUP BY w.number
     HAVING count(*) = 2
 ),
-run AS (
-    SELECT number, unnest(range(first_number, last_number + 1)) AS switch_number FROM extent
-)
+run AS (SELECT number, unnest(range(first_number, last_number + 1)) AS switch_number FROM extent)
 SELECT
-    w.thread_id,
-    w.state_start_ns,
-    w.start_ns AS wait_start_ns,
+    w.thread_id, w.state_start_ns, w.start_ns AS wait_start_ns,
     greatest(w.start_ns, r.ts_ns + w.shift_ns) AS start_ns,
     least(w.end_ns, coalesce(e.ts_ns + w.shift_ns, w.end_ns)) AS end_ns,
-    w.state,
-    w.cpu,
-    w.clock_key,
-    r.next_tid AS tid,
-    r.next_comm AS name,
+    w.state, w.cpu, w.clock_key, r.next_tid AS tid, r.next_comm AS name,
     r.next_prio + CASE WHEN o.tracer LIKE 'perf%' THEN 0 ELSE 100 END AS priority,
     w.priority AS thread_priority
 FROM run AS n

@@ -1,4 +1,3 @@
--- name: staging.cpu_usage
 -- description: What ran on each CPU, second by second: all threads, also of processes without ROS.
 -- grain: one row per CPU, second and thread that ran
 -- when: staging.schedule
@@ -94,19 +93,13 @@ host AS (
     GROUP BY s.clock_key
 )
 SELECT
-    h.host_id,
-    u.cpu,
+    h.host_id, u.cpu,
     u.second * 1_000_000_000 AS start_ns,
-    t.thread_id,
-    u.tid,
-    n.name,
-    u.running_ns,
-    f.frequency_hz
+    t.thread_id, u.tid, n.name, u.running_ns, f.frequency_hz
 FROM usage AS u
 JOIN host AS h ON u.clock_key = h.clock_key
 LEFT JOIN named AS n ON u.clock_key = n.clock_key AND u.tid = n.tid
-LEFT JOIN frequency AS f
-    ON u.clock_key = f.clock_key AND u.cpu = f.cpu AND u.second = f.second
+LEFT JOIN frequency AS f ON u.clock_key = f.clock_key AND u.cpu = f.cpu AND u.second = f.second
 LEFT JOIN staging.thread_tid AS t
     ON u.clock_key = t.clock_key
     AND u.tid = t.tid

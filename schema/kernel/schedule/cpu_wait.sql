@@ -1,4 +1,3 @@
--- name: staging.cpu_wait
 -- description: Waits of threads for a CPU: preempted, or woken. A wait is cut where the thread goes
 --     to another CPU. Where the kernel trace does not say that, a thread that was woken waits for
 --     the CPU on which it goes on; else for the one that its waking names.
@@ -15,17 +14,10 @@ WITH migration AS (
         AND m.ts_ns + s.shift_ns < t.until_ns
     WHERE s.is_joined
 ),
-wait AS (
-    SELECT *
-    FROM staging.schedule_interval
-    WHERE state IN ('preempted', 'runnable')
-),
+wait AS (SELECT * FROM staging.schedule_interval WHERE state IN ('preempted', 'runnable')),
 begin AS (
     SELECT
-        w.thread_id,
-        w.tid,
-        w.start_ns AS state_start_ns,
-        w.start_ns,
+        w.thread_id, w.tid, w.start_ns AS state_start_ns, w.start_ns,
         CASE
             WHEN m.at_ns = w.start_ns THEN m.cpu
             WHEN w.state = 'preempted' THEN w.cpu
@@ -41,8 +33,7 @@ begin AS (
 cut AS (
     SELECT m.thread_id, m.tid, w.start_ns AS state_start_ns, m.at_ns AS start_ns, m.cpu
     FROM migration AS m
-    ASOF JOIN wait AS w
-        ON m.thread_id = w.thread_id AND m.tid = w.tid AND m.at_ns > w.start_ns
+    ASOF JOIN wait AS w ON m.thread_id = w.thread_id AND m.tid = w.tid AND m.at_ns > w.start_ns
     WHERE m.at_ns < w.end_ns
 ),
 part AS (
@@ -52,17 +43,10 @@ part AS (
 )
 SELECT
     row_number() OVER (ORDER BY p.thread_id, p.tid, p.start_ns) AS number,
-    p.thread_id,
-    p.tid,
-    p.state_start_ns,
-    p.start_ns,
+    p.thread_id, p.tid, p.state_start_ns, p.start_ns,
     lead(p.start_ns, 1, w.end_ns) OVER (
         PARTITION BY p.thread_id, p.tid, p.state_start_ns ORDER BY p.start_ns
     ) AS end_ns,
-    w.state,
-    w.trace_index,
-    p.cpu,
-    w.priority
+    w.state, w.trace_index, p.cpu, w.priority
 FROM part AS p
-JOIN wait AS w
-    ON p.thread_id = w.thread_id AND p.tid = w.tid AND p.state_start_ns = w.start_ns
+JOIN wait AS w ON p.thread_id = w.thread_id AND p.tid = w.tid AND p.state_start_ns = w.start_ns

@@ -1,4 +1,3 @@
--- name: staging.data_arrival
 -- description: When messages arrived before they were taken. The listener of the middleware says so
 --     (CARET, with Fast DDS): the first time that its process had one of that stamp. With several
 --     readers in the process it is not known which of them had it then. In an events executor, the
@@ -8,8 +7,7 @@
 -- grain: one row per take of which this is known
 -- when: raw.ros2_caret_on_data_available, staging.executor WHERE kind = 'events'
 WITH heard AS (
-    SELECT
-        n.take_id, t.taken_ns - min(a.ts_ns) AS waited_ns, count(*) > 1 AS is_ambiguous
+    SELECT n.take_id, t.taken_ns - min(a.ts_ns) AS waited_ns, count(*) > 1 AS is_ambiguous
     FROM staging.located('ros2_caret_on_data_available') AS a
     JOIN staging.take_chain AS t
         ON a.process_id = t.process_id AND a.source_stamp = t.source_timestamp_ns
@@ -25,8 +23,7 @@ queued AS (
     ANTI JOIN heard AS h ON m.take_id = h.take_id
     WHERE e.kind = 'events'
 )
-SELECT take_id, waited_ns, is_ambiguous
-FROM heard
+SELECT take_id, waited_ns, is_ambiguous FROM heard
 UNION ALL
 SELECT take_id, taken_ns - least(next_ns, taken_ns), false
 FROM queued

@@ -1,4 +1,3 @@
--- name: staging.middleware_waking
 -- description: When ROS threads woke the middleware's threads that wake the threads of events
 --     executors: how messages come to their process while these run. By their names, these are
 --     threads of the middleware.

@@ -1,4 +1,3 @@
--- name: staging.other_thread
 -- description: Threads that are none of a ROS process, but had the CPU while one that is waited
 --     for it, or woke it. The kernel's idle thread of each CPU is one of them.
 -- grain: one row per host, tid and name
@@ -20,10 +19,7 @@ host AS (
 )
 SELECT
     row_number() OVER (ORDER BY h.host_id, o.tid, o.name) AS other_thread_id,
-    h.host_id,
-    o.tid,
-    o.name,
-    o.clock_key
+    h.host_id, o.tid, o.name, o.clock_key
 FROM (
     SELECT DISTINCT o.clock_key, o.tid, o.name
     FROM seen AS o

@@ -1,19 +1,11 @@
--- name: staging.preemptor
 -- description: What ran on the CPU for which a thread of a ROS process waited.
 -- grain: one row per wait for a CPU and stretch of time in which another thread had it
 -- when: staging.cpu_taken
 SELECT
-    c.thread_id,
-    c.state_start_ns,
-    c.wait_start_ns,
-    c.start_ns,
-    c.end_ns,
-    c.state,
-    c.cpu,
+    c.thread_id, c.state_start_ns, c.wait_start_ns, c.start_ns, c.end_ns, c.state, c.cpu,
     t.thread_id AS preemptor_thread_id,
     CASE WHEN t.thread_id IS NULL THEN o.other_thread_id END AS preemptor_other_thread_id,
-    c.priority AS preemptor_priority,
-    c.thread_priority
+    c.priority AS preemptor_priority, c.thread_priority
 FROM staging.cpu_taken AS c
 LEFT JOIN staging.thread_tid AS t
     ON c.clock_key = t.clock_key
@@ -21,7 +13,5 @@ LEFT JOIN staging.thread_tid AS t
     AND c.start_ns >= t.from_ns
     AND c.start_ns < t.until_ns
 LEFT JOIN staging.other_thread AS o
-    ON c.clock_key = o.clock_key
-    AND c.tid = o.tid
-    AND c.name IS NOT DISTINCT FROM o.name
+    ON c.clock_key = o.clock_key AND c.tid = o.tid AND c.name IS NOT DISTINCT FROM o.name
 ORDER BY c.thread_id, c.start_ns

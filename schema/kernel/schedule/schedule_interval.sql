@@ -1,4 +1,3 @@
--- name: staging.schedule_interval
 -- description: What each thread of a ROS process did, from switch to switch and waking. A waking
 --     may come before the switch that it undoes. What the next switch contradicts is not known. A
 --     thread that is seen on a CPU without a switch to it got it at some time since its waking.
@@ -14,8 +13,7 @@ WITH extent AS (
 ),
 life AS (
     SELECT
-        t.thread_id,
-        t.tid,
+        t.thread_id, t.tid,
         greatest(e.start_ns, t.from_ns) AS start_ns,
         least(e.end_ns, t.until_ns) AS end_ns
     FROM staging.thread_tid AS t
@@ -42,14 +40,12 @@ step AS (
 -- traces, the one counts whose waker is known.
 waking AS (
     SELECT
-        k.thread_id,
-        k.tid,
+        k.thread_id, k.tid,
         w.number + CASE WHEN w.is_on THEN 1 ELSE 0 END AS number,
         min_by(k.event_id, (k.at_ns, k.waker_tid IS NULL, k.event_id)) AS event_id,
         min(k.at_ns) AS at_ns
     FROM staging.thread_waking AS k
-    ASOF LEFT JOIN step AS w
-        ON k.thread_id = w.thread_id AND k.tid = w.tid AND k.at_ns >= w.at_ns
+    ASOF LEFT JOIN step AS w ON k.thread_id = w.thread_id AND k.tid = w.tid AND k.at_ns >= w.at_ns
     GROUP BY ALL
 ),
 placed AS (
@@ -76,8 +72,7 @@ placed AS (
         END AS state
     FROM step AS s
     JOIN life AS f ON s.thread_id = f.thread_id AND s.tid = f.tid
-    LEFT JOIN waking AS k
-        ON s.thread_id = k.thread_id AND s.tid = k.tid AND s.number = k.number
+    LEFT JOIN waking AS k ON s.thread_id = k.thread_id AND s.tid = k.tid AND s.number = k.number
 ),
 interval AS (
     SELECT
@@ -99,9 +94,7 @@ interval AS (
     UNION ALL
     -- What was before the first switch.
     SELECT
-        s.thread_id,
-        s.tid,
-        s.trace_index,
+        s.thread_id, s.tid, s.trace_index,
         CASE
             WHEN s.is_on OR s.unseen_since_ns IS NOT NULL THEN coalesce(k.at_ns, s.unseen_since_ns)
             ELSE f.start_ns
@@ -115,8 +108,7 @@ interval AS (
         s.cpu, s.cpu, s.priority, CASE WHEN s.is_on THEN k.event_id END
     FROM step AS s
     JOIN life AS f ON s.thread_id = f.thread_id AND s.tid = f.tid
-    LEFT JOIN waking AS k
-        ON s.thread_id = k.thread_id AND s.tid = k.tid AND k.number IS NULL
+    LEFT JOIN waking AS k ON s.thread_id = k.thread_id AND s.tid = k.tid AND k.number IS NULL
     WHERE s.number = 1
 )
 SELECT

@@ -1,16 +1,12 @@
--- name: staging.thread_state
 -- description: States of threads of ROS processes, with what took the CPU and what woke them.
 -- grain: one row per interval in which a thread had one state
 -- when: staging.schedule_interval
 WITH packet AS (
     SELECT
-        s.clock_key,
-        p.discarded_event_count,
+        s.clock_key, p.discarded_event_count,
         coalesce(p.last_event_ns, p.begin_ns) + s.shift_ns AS start_ns,
         coalesce(
-            lead(p.begin_ns) OVER (
-                PARTITION BY p.trace_index, p.stream_index ORDER BY p.position
-            ),
+            lead(p.begin_ns) OVER (PARTITION BY p.trace_index, p.stream_index ORDER BY p.position),
             p.end_ns
         ) + s.shift_ns AS end_ns
     FROM raw.packet AS p
@@ -21,8 +17,7 @@ WITH packet AS (
 -- reaches as well.
 loss AS (
     SELECT
-        clock_key,
-        start_ns,
+        clock_key, start_ns,
         max(end_ns) OVER (PARTITION BY clock_key ORDER BY start_ns) AS until_ns
     FROM packet
     WHERE discarded_event_count <> 0
@@ -38,16 +33,10 @@ interval AS (
 )
 SELECT
     row_number() OVER (ORDER BY i.thread_id, i.start_ns) AS number,
-    i.thread_id,
-    i.start_ns,
-    i.end_ns,
-    i.state,
-    i.cpu,
-    i.priority,
+    i.thread_id, i.start_ns, i.end_ns, i.state, i.cpu, i.priority,
     p.preemptor_thread_id AS preempted_by_thread_id,
     p.preemptor_other_thread_id AS preempted_by_other_thread_id,
-    p.preemptor_priority AS preempted_by_priority,
-    w.kind AS waker_kind,
+    p.preemptor_priority AS preempted_by_priority, w.kind AS waker_kind,
     wt.thread_id AS waker_thread_id,
     CASE WHEN wt.thread_id IS NULL THEN wo.other_thread_id END AS waker_other_thread_id,
     coalesce(l.until_ns > i.start_ns, false) AS is_loss_affected

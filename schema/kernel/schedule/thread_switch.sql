@@ -1,4 +1,3 @@
--- name: staging.thread_switch
 -- description: Switches of threads of ROS processes, in their order on each thread: onto a CPU, and
 --     off it. Where the switch onto a CPU was not recorded, the first event of the thread there
 --     tells that it has it: it got it after the switch at `unseen_since_ns`. Priorities are the

@@ -1,4 +1,3 @@
--- name: staging.thread_tid
 -- description: The number that the kernel has for each thread. A declaration counts: contexts of
 --     switches while its process lived, else the latest of the state dump and its creation; unless
 --     it is of several threads or the schedule contradicts it. Else it is what ran on the CPU at
@@ -8,8 +7,7 @@
 -- grain: one row per thread of a process life and number
 -- when: staging.schedule
 WITH dump AS (
-    SELECT
-        trace_index, ts_ns, tid, namespace_tid AS vtid, namespace_pid AS vpid, ns_inum
+    SELECT trace_index, ts_ns, tid, namespace_tid AS vtid, namespace_pid AS vpid, ns_inum
     FROM raw.lttng_statedump_process_state
     WHERE namespace_tid IS NOT NULL
     UNION ALL
@@ -91,10 +89,7 @@ lived AS (
 ),
 latest AS (
     SELECT
-        v.thread_id,
-        d.source,
-        d.tid,
-        d.declared_ns,
+        v.thread_id, d.source, d.tid, d.declared_ns,
         -- A dump declares all threads at about the same time, contexts do so again and again.
         CASE d.source WHEN 'fork' THEN d.declared_ns ELSE 0 END AS rank_ns
     FROM lived AS v
@@ -120,8 +115,7 @@ declared AS (
 ),
 known AS (
     SELECT
-        v.thread_id,
-        v.clock_key,
+        v.thread_id, v.clock_key,
         coalesce(p.first_ns, v.first_seen_ns) AS first_ns,
         coalesce(p.tid, d.tid) AS tid,
         CASE WHEN d.tid = coalesce(p.tid, d.tid) THEN d.source ELSE 'schedule' END AS source
@@ -131,10 +125,7 @@ known AS (
     WHERE coalesce(p.tid, d.tid) IS NOT NULL
 )
 SELECT
-    thread_id,
-    clock_key,
-    tid,
-    source,
+    thread_id, clock_key, tid, source,
     CASE WHEN row_number() OVER number = 1 THEN -4611686018427387904 ELSE first_ns END AS from_ns,
     lead(first_ns, 1, 4611686018427387904) OVER number AS until_ns
 FROM known

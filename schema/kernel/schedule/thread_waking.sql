@@ -1,4 +1,3 @@
--- name: staging.thread_waking
 -- description: When threads of ROS processes were woken, and by what: the interrupt that the CPU
 --     was handling, else the thread that ran there. A switch ends every interrupt. Where the kernel
 --     trace contradicts itself about what ran, only a thread that is seen there is known. `kind` is
@@ -57,13 +56,8 @@ found AS (
         ON d.trace_index = u.trace_index AND d.cpu = u.cpu AND d.at_ns >= u.at_ns
 )
 SELECT
-    thread_id,
-    tid,
-    event_id,
-    at_ns,
+    thread_id, tid, event_id, at_ns,
     coalesce(interrupt, CASE WHEN waker_tid IS NOT NULL THEN 'thread' END) AS kind,
-    clock_key,
-    target_cpu,
-    waker_tid,
+    clock_key, target_cpu, waker_tid,
     CASE WHEN NOT is_contradicted THEN next_comm END AS waker_name
 FROM found

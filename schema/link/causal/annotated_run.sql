@@ -1,5 +1,3 @@
--- name: derive.annotated_run
--- kind: macro
 -- description: Instances of the callbacks of subscriptions that are inputs of annotations. Where no
 --     callback of the subscription was traced (rclpy), its takes stand for them: each is over as
 --     soon as it began, and has the negative of its identity.
@@ -9,11 +7,7 @@ WITH instance AS (
     SELECT
         i.run_id,
         coalesce(c.subscription_id, t.subscription_id) AS subscription_id,
-        i.callback_instance_id,
-        i.trace_id,
-        i.thread_id,
-        i.start_ns,
-        i.start_event_id,
+        i.callback_instance_id, i.trace_id, i.thread_id, i.start_ns, i.start_event_id,
         i.effective_end_event_id
     FROM store.callback_instance AS i
     JOIN store.callback AS c ON i.callback_id = c.callback_id

@@ -1,5 +1,3 @@
--- name: derive.answer_doubtful
--- kind: macro
 -- description: Publications that followed a take without a callback, and may have another cause
 --     than its message. In rclpy a timer shows no event. What it publishes follows some message,
 --     too, and so does what a loop publishes by a clock of its own. So a publisher is doubtful if a
@@ -122,8 +120,7 @@ doubtful AS (
 SELECT f.publication_id
 FROM follower AS f
 JOIN usual AS u
-    ON f.subscription_id IS NOT DISTINCT FROM u.subscription_id
-    AND f.publisher_id = u.publisher_id
+    ON f.subscription_id IS NOT DISTINCT FROM u.subscription_id AND f.publisher_id = u.publisher_id
 QUALIFY f.is_between_nodes
     OR f.publisher_id IN (FROM doubtful)
     OR sum(f.number) OVER (

@@ -1,5 +1,3 @@
--- name: derive.approximate_message
--- kind: macro
 -- description: Messages of the inputs of approximately synchronous annotations. The filter compares
 --     the stamps in their headers, which are not in the trace: `stamp_ns`, when they were
 --     published, stands for them. A header may be older, by up to `age_ns`: its node may have

@@ -1,5 +1,3 @@
--- name: derive.approximate_set
--- kind: macro
 -- description: Sets of messages as message_filters (ApproximateTime) makes them, one for each
 --     message that may be the pivot of a set: the latest of the first messages of the inputs that
 --     are still unused. A set is the first message of every input from some moment on, up to the
@@ -30,9 +28,7 @@ WITH follower AS MATERIALIZED (
 around AS MATERIALIZED (
     SELECT
         p.annotation_id, p.pivot_id, p.pivot_ns, p.pivot_age_ns, p.subscription_id,
-        l.stamp_ns AS last_ns,
-        l.start_ns AS last_start_ns,
-        l.start_event_id AS last_event_id,
+        l.stamp_ns AS last_ns, l.start_ns AS last_start_ns, l.start_event_id AS last_event_id,
         l.age_ns, l.next_ns, l.next_event_id, l.next_age_ns, l.is_set_back,
         -- Where it goes on after it waited for this input: those with older messages have come.
         CASE
@@ -57,9 +53,7 @@ around AS MATERIALIZED (
     QUALIFY count(*) OVER (PARTITION BY p.annotation_id, p.pivot_id) = p.input_count
 ),
 -- Moments that a set may start at: no later one has the same messages.
-start AS (
-    SELECT annotation_id, pivot_id, pivot_ns, last_ns AS start_ns FROM around
-),
+start AS (SELECT annotation_id, pivot_id, pivot_ns, last_ns AS start_ns FROM around),
 possible AS MATERIALIZED (
     SELECT
         s.annotation_id, s.pivot_id, s.start_ns,
@@ -153,8 +147,7 @@ close AS (
     WHERE coalesce(p.cost - n.cost <= a.doubt, true)
     UNION
     -- The clock of the stamps was set back: the filter has its messages in another order.
-    SELECT annotation_id, pivot_id FROM around
-    WHERE is_set_back OR next_event_id < last_event_id
+    SELECT annotation_id, pivot_id FROM around WHERE is_set_back OR next_event_id < last_event_id
 )
 SELECT
     m.annotation_id, m.pivot_id, p.pivot_ns, p.proof_event_id, p.since_ns,

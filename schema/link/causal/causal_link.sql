@@ -1,5 +1,3 @@
--- name: derive.causal_link
--- kind: macro
 -- description: Causal links as they are stored. In a process that is several with equal ids, the
 --     cause may be one of another process, so there is one candidate more. Annotations take links
 --     away. `independent` says that a publisher does not answer a subscription: links of the kinds
@@ -11,14 +9,8 @@
 --     publisher_id, kind, annotation_id, candidate_count, is_loss_affected
 CREATE OR REPLACE MACRO derive.causal_link(only_run, links) AS TABLE
 SELECT
-    l.run_id,
-    l.callback_instance_id,
-    l.publication_id,
-    l.take_id,
-    t.subscription_id,
-    l.publisher_id,
-    l.kind,
-    l.annotation_id,
+    l.run_id, l.callback_instance_id, l.publication_id, l.take_id, t.subscription_id,
+    l.publisher_id, l.kind, l.annotation_id,
     greatest(
         l.candidate_count, CASE WHEN m.publication_id IS NOT NULL THEN 2 END
     ) AS candidate_count,
@@ -40,6 +32,4 @@ ANTI JOIN (
     WHERE run_id = only_run
         AND kind IN ('independent', 'approximate_sync', 'periodic_async', 'queue')
 ) AS d
-    ON l.kind = d.kind
-    AND t.subscription_id = d.subscription_id
-    AND l.publisher_id = d.publisher_id
+    ON l.kind = d.kind AND t.subscription_id = d.subscription_id AND l.publisher_id = d.publisher_id

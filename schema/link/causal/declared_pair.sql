@@ -1,4 +1,3 @@
--- name: derive.declared_pair
 -- description: Inputs and outputs that annotations declare.
 -- grain: one row per annotation, input and output
 SELECT a.run_id, a.kind, i.subscription_id, o.publisher_id

@@ -1,5 +1,3 @@
--- name: derive.link_call
--- kind: macro
 -- when: store.request, store.response
 -- description: What a thread sends after it took a request or a response for which no callback is
 --     traced: clients and action servers of rclcpp run their callbacks right behind the take. The
@@ -88,10 +86,8 @@ sent AS (
         FROM store.link_response AS l
         JOIN store.response AS r ON l.response_id = r.response_id
         JOIN store.callback_instance AS i
-            ON l.callback_instance_id = i.callback_instance_id
-            AND r.sender_thread_id = i.thread_id
-        WHERE l.run_id = only_run
-            AND r.sent_ns BETWEEN i.start_ns AND coalesce(i.end_ns, r.sent_ns)
+            ON l.callback_instance_id = i.callback_instance_id AND r.sender_thread_id = i.thread_id
+        WHERE l.run_id = only_run AND r.sent_ns BETWEEN i.start_ns AND coalesce(i.end_ns, r.sent_ns)
     ) AS i ON r.response_id = i.response_id
     WHERE r.run_id = only_run
 ),
@@ -124,13 +120,9 @@ independent AS (
     WHERE taken_request_id IS NULL AND taken_response_id IS NULL
 )
 SELECT
-    only_run AS run_id,
-    l.taken_request_id,
-    l.taken_response_id,
-    l.publication_id,
+    only_run AS run_id, l.taken_request_id, l.taken_response_id, l.publication_id,
     CASE l.kind WHEN 'publisher' THEN l.object_id END AS publisher_id,
-    l.request_id,
-    l.response_id,
+    l.request_id, l.response_id,
     1 + (i.thread_id IS NOT NULL OR coalesce(p.is_ambiguous, false))::BIGINT AS candidate_count
 FROM known AS l
 LEFT JOIN independent AS i

@@ -1,5 +1,3 @@
--- name: derive.link_causal
--- kind: macro
 -- description: Which callback instance made each publication. Lost events may spoil a link where a
 --     gap touches the instance or the publication. What a client does with a response that it takes
 --     inside of another callback follows from the response (derive.link_call).

@@ -1,5 +1,3 @@
--- name: derive.link_causal_annotated
--- kind: macro
 -- description: Publications that messages led to which were kept until then, as annotations tell.
 --     A link may be spoilt by lost events where a gap touches the callback instance that kept the
 --     message, or the publication.

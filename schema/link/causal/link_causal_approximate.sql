@@ -1,5 +1,3 @@
--- name: derive.link_causal_approximate
--- kind: macro
 -- description: Messages of the sets that approximately synchronous annotations publish. A
 --     publication inside a callback instance of an input is a firing: that instance showed that a
 --     set is complete (derive.approximate_set). If it did so for sets of several pivots that
@@ -13,9 +11,7 @@
 -- param: publications VARCHAR  Name of the rows of derive.annotated_publication
 -- param: runs VARCHAR  Name of the rows of derive.annotated_run
 CREATE OR REPLACE MACRO derive.link_causal_approximate(only_run, publications, runs) AS TABLE
-WITH filtered AS MATERIALIZED (
-    FROM derive.approximate_message(only_run, runs)
-),
+WITH filtered AS MATERIALIZED (FROM derive.approximate_message(only_run, runs)),
 published AS MATERIALIZED (
     SELECT
         b.run_id, b.annotation_id, b.kind, b.publication_id, b.trace_id, b.thread_id, b.start_ns,
@@ -38,9 +34,7 @@ firing AS (
     FROM published
     GROUP BY annotation_id, cut_event_id
 ),
-member AS MATERIALIZED (
-    FROM derive.approximate_set(only_run, 'filtered')
-),
+member AS MATERIALIZED (FROM derive.approximate_set(only_run, 'filtered')),
 made AS MATERIALIZED (
     SELECT
         annotation_id, pivot_id, pivot_ns, proof_event_id, since_ns, is_close,
@@ -73,10 +67,8 @@ used AS (
         unnest([min(m.stamp_ns), max(m.stamp_ns)]) AS used_ns,
         unnest([1, 2]) AS reading
     FROM complete AS c
-    JOIN complete AS b
-        ON c.annotation_id = b.annotation_id AND c.previous_event_id = b.cut_event_id
-    JOIN member AS m
-        ON b.annotation_id = m.annotation_id AND b.proof_event_id = m.proof_event_id
+    JOIN complete AS b ON c.annotation_id = b.annotation_id AND c.previous_event_id = b.cut_event_id
+    JOIN member AS m ON b.annotation_id = m.annotation_id AND b.proof_event_id = m.proof_event_id
     WHERE c.set_count > 1
     GROUP BY c.annotation_id, c.cut_event_id, m.subscription_id
 ),
@@ -113,14 +105,11 @@ chosen AS MATERIALIZED (
         c.proof_event_id = c.cut_event_id
         AND (c.set_count = 1 OR coalesce(d.is_certain, false)) AS is_certain
     FROM complete AS c
-    LEFT JOIN decided AS d
-        ON c.annotation_id = d.annotation_id AND c.cut_event_id = d.cut_event_id
+    LEFT JOIN decided AS d ON c.annotation_id = d.annotation_id AND c.cut_event_id = d.cut_event_id
 )
 SELECT
     b.run_id, b.annotation_id, b.kind, b.publication_id, b.trace_id, b.thread_id, b.start_ns,
-    b.start_event_id,
-    m.callback_instance_id,
-    c.since_ns,
+    b.start_event_id, m.callback_instance_id, c.since_ns,
     CASE
         WHEN c.is_certain AND NOT m.is_close AND (b.publication_count = 1 OR NOT c.may_be_two)
             THEN 1

@@ -1,5 +1,3 @@
--- name: derive.link_causal_by_hand
--- kind: macro
 -- description: Publications caused by messages that no callback was called with: what a thread
 --     publishes after such a take (`take_adjacent`), and what a callback instance publishes after
 --     it (`polled`). A publication that may be no answer to the message before it has one candidate
@@ -9,9 +7,7 @@
 -- grain: one row per take, and publication that it caused
 -- when: derive.take_by_hand
 CREATE OR REPLACE MACRO derive.link_causal_by_hand(only_run) AS TABLE
-WITH adjacent AS MATERIALIZED (
-    FROM derive.link_causal_take_adjacent(only_run)
-),
+WITH adjacent AS MATERIALIZED (FROM derive.link_causal_take_adjacent(only_run)),
 -- Publications whose thread slept after the take: it then began something new.
 slept AS (
     SELECT a.publication_id
@@ -46,8 +42,7 @@ link AS (
     JOIN store.publication AS b ON a.publication_id = b.publication_id
     WHERE t.run_id = only_run AND b.run_id = only_run
     UNION ALL
-    SELECT
-        run_id, NULL, take_id, publication_id, publisher_id, 'polled', NULL, 1, is_loss_affected
+    SELECT run_id, NULL, take_id, publication_id, publisher_id, 'polled', NULL, 1, is_loss_affected
     FROM derive.link_causal_polled(only_run)
 )
 FROM derive.causal_link(only_run, 'link')

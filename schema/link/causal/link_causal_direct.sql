@@ -1,5 +1,3 @@
--- name: derive.link_causal_direct
--- kind: macro
 -- description: Publications inside a callback instance on its thread, from its start to its
 --     effective end; of nested instances the innermost counts. The order of events decides, not
 --     time. The last begin or end of a callback before the publication tells which instance that

@@ -1,5 +1,3 @@
--- name: derive.link_causal_indirect
--- kind: macro
 -- description: Messages that were kept until another callback published, as annotations tell.
 --     `periodic_async`: a publication uses the latest message of each input, whatever was used
 --     before; the caches are never emptied. `partial_sync`: publications need a message of every
@@ -18,12 +16,8 @@
 --     says what stands for it.
 -- grain: one row per annotation, publication by one of its outputs, and other input with a message
 CREATE OR REPLACE MACRO derive.link_causal_indirect(only_run) AS TABLE
-WITH RECURSIVE annotated AS MATERIALIZED (
-    FROM derive.annotated_publication(only_run)
-),
-input_run AS MATERIALIZED (
-    FROM derive.annotated_run(only_run)
-),
+WITH RECURSIVE annotated AS MATERIALIZED (FROM derive.annotated_publication(only_run)),
+input_run AS MATERIALIZED (FROM derive.annotated_run(only_run)),
 nesting AS (
     SELECT DISTINCT parent_id
     FROM store.callback_instance
@@ -42,8 +36,7 @@ demand AS MATERIALIZED (
     SELECT
         b.run_id, b.annotation_id, b.kind, b.publication_id,
         b.callback_instance_id AS publishing_id, b.trace_id, b.thread_id, b.start_ns,
-        b.start_event_id, b.cut_event_id,
-        i.subscription_id,
+        b.start_event_id, b.cut_event_id, i.subscription_id,
         CASE
             WHEN n.parent_id IS NULL THEN coalesce(f.first_event_id, b.start_event_id)
             ELSE b.start_event_id
@@ -86,8 +79,7 @@ used AS (
     SELECT r.annotation_id, r.callback_instance_id
     FROM run AS r
     JOIN around AS a ON r.callback_instance_id = a.callback_instance_id
-    JOIN firing AS f
-        ON r.annotation_id = f.annotation_id AND a.outer_id = f.callback_instance_id
+    JOIN firing AS f ON r.annotation_id = f.annotation_id AND a.outer_id = f.callback_instance_id
     WHERE r.effective_end_event_id <= f.last_event_id
 ),
 -- Candidates beside those in a cache at the cut, or nested in the firing.
@@ -138,14 +130,10 @@ nested AS (
     WHERE e.start_event_id > d.cut_event_id
 ),
 -- Publications of one callback instance share their cut.
-cut AS (
-    SELECT DISTINCT annotation_id, subscription_id, cut_event_id, emptied_event_id
-    FROM demand
-),
+cut AS (SELECT DISTINCT annotation_id, subscription_id, cut_event_id, emptied_event_id FROM demand),
 at_cut AS MATERIALIZED (
     SELECT
-        c.annotation_id, c.subscription_id, c.cut_event_id, e.callback_instance_id,
-        e.start_event_id
+        c.annotation_id, c.subscription_id, c.cut_event_id, e.callback_instance_id, e.start_event_id
     FROM cut AS c
     ASOF JOIN ended AS e
         ON c.annotation_id = e.annotation_id
@@ -183,14 +171,12 @@ possible AS (
             WHEN e.effective_end_event_id > p.since_event_id THEN e.callback_instance_id
             ELSE p.last_id
         END AS callback_instance_id,
-        p.since_event_id,
-        p.begun_count
+        p.since_event_id, p.begun_count
     FROM (
         SELECT
             t.annotation_id, t.publication_id, t.subscription_id, t.read_event_id,
             greatest(t.input_start_event_id, t.kept_event_id) AS since_event_id,
-            b.run_count AS begun_count,
-            b.last_id
+            b.run_count AS begun_count, b.last_id
         FROM there AS t
         ASOF JOIN begun AS b
             ON t.annotation_id = b.annotation_id
@@ -218,10 +204,8 @@ cached AS (
         d.run_id, d.annotation_id, d.kind, d.publication_id, d.trace_id, d.thread_id, d.start_ns,
         d.start_event_id,
         coalesce(
-            n.callback_instance_id,
-            d.callback_instance_id,
-            CASE WHEN d.kind = 'partial_sync' AND a.outer_id IS NULL
-                THEN p.callback_instance_id END
+            n.callback_instance_id, d.callback_instance_id,
+            CASE WHEN d.kind = 'partial_sync' AND a.outer_id IS NULL THEN p.callback_instance_id END
         ) AS callback_instance_id,
         CASE
             WHEN d.kind = 'periodic_async' THEN
@@ -263,9 +247,7 @@ found AS MATERIALIZED (
     SELECT
         c.run_id, c.annotation_id, c.kind, c.publication_id, c.callback_instance_id,
         c.candidate_count, c.trace_id, c.thread_id, c.start_ns, c.start_event_id,
-        i.trace_id AS input_trace_id,
-        i.thread_id AS input_thread_id,
-        i.start_ns AS input_start_ns,
+        i.trace_id AS input_trace_id, i.thread_id AS input_thread_id, i.start_ns AS input_start_ns,
         least(c.since_ns, i.start_ns) AS since_ns,
         i.start_event_id AS input_start_event_id
     FROM linked AS c
@@ -311,11 +293,7 @@ crossing AS (
     WHERE k.resumed_event_id <= e.start_event_id OR e.begins_between
 )
 SELECT
-    f.run_id,
-    f.callback_instance_id,
-    f.publication_id,
-    f.kind,
-    f.annotation_id,
+    f.run_id, f.callback_instance_id, f.publication_id, f.kind, f.annotation_id,
     -- What may be missing may have been in the set.
     greatest(
         f.candidate_count,

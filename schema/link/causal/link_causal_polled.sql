@@ -1,5 +1,3 @@
--- name: derive.link_causal_polled
--- kind: macro
 -- description: Messages that a callback instance takes by itself (polling subscriptions), and what
 --     it publishes afterwards. Of each subscription the last message that it took before counts.
 --     An executor that spins inside of a callback takes messages there, too: each has a callback
@@ -18,8 +16,7 @@ by_hand AS MATERIALIZED (
 ),
 run AS MATERIALIZED (
     SELECT
-        i.callback_instance_id, i.parent_id, i.thread_id, i.start_event_id,
-        i.effective_end_event_id
+        i.callback_instance_id, i.parent_id, i.thread_id, i.start_event_id, i.effective_end_event_id
     FROM store.callback_instance AS i
     SEMI JOIN by_hand AS t ON i.thread_id = t.thread_id
     WHERE i.run_id = only_run
@@ -32,8 +29,7 @@ around (take_id, event_id, callback_instance_id, parent_id, effective_end_event_
     FROM by_hand AS t
     ASOF JOIN run AS i ON t.thread_id = i.thread_id AND t.start_event_id > i.start_event_id
     UNION ALL
-    SELECT
-        a.take_id, a.event_id, i.callback_instance_id, i.parent_id, i.effective_end_event_id
+    SELECT a.take_id, a.event_id, i.callback_instance_id, i.parent_id, i.effective_end_event_id
     FROM around AS a
     JOIN run AS i ON a.parent_id = i.callback_instance_id
     WHERE a.event_id >= a.effective_end_event_id
@@ -68,9 +64,7 @@ linked AS MATERIALIZED (
         AND p.subscription_id = t.subscription_id
         AND p.start_event_id > t.start_event_id
 )
-SELECT
-    only_run AS run_id, l.take_id, l.publication_id, l.publisher_id,
-    l.is_loss_affected
+SELECT only_run AS run_id, l.take_id, l.publication_id, l.publisher_id, l.is_loss_affected
 FROM linked AS l
 ANTI JOIN derive.take_behind_gap('linked') AS g
     ON l.publication_id = g.publication_id AND l.take_id = g.take_id

@@ -1,5 +1,3 @@
--- name: derive.link_causal_queue
--- kind: macro
 -- description: Messages that wait in a queue until a thread of the node has worked them off, first
 --     in, first out, as annotations of the kind `queue` tell: each publication by an output answers
 --     the oldest message that none answered yet. Where the queue holds no more than `queue_depth`,
@@ -62,9 +60,7 @@ answer AS (
         *, number - surplus_count AS answer_number,
         lag(come_count) OVER in_order AS come_before_count
     FROM counted
-    WINDOW in_order AS (
-        PARTITION BY annotation_id, input_id, publisher_id ORDER BY start_event_id
-    )
+    WINDOW in_order AS (PARTITION BY annotation_id, input_id, publisher_id ORDER BY start_event_id)
     -- One too many has the number of the one before.
     QUALIFY row_number() OVER (
         PARTITION BY annotation_id, input_id, publisher_id, number - surplus_count

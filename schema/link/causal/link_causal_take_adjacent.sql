@@ -1,13 +1,10 @@
--- name: derive.link_causal_take_adjacent
--- kind: macro
 -- description: Publications that a thread makes after it took a message by hand (rclpy, rclc, wait
 --     sets), until its next take. A take of a request or a response counts, too. The link ends at
 --     the begin or end of a callback, at the next event of an executor, and at a gap. What is
 --     published inside a callback instance is caused by that instance instead. Where callbacks of
---     Python are traced, no message causes anything else. What the middleware
---     publishes by itself (it has no publisher, though nothing was lost) has no cause. Timers of
---     rclpy do not show: what they publish is among the rows, and derive.answer_doubtful tells it
---     apart.
+--     Python are traced, no message causes anything else. What the middleware publishes by itself
+--     (it has no publisher, though nothing was lost) has no cause. Timers of rclpy do not show:
+--     what they publish is among the rows, and derive.answer_doubtful tells it apart.
 -- grain: one row per publication made after a take without a callback
 CREATE OR REPLACE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE
 WITH by_hand AS (
@@ -20,9 +17,7 @@ WITH by_hand AS (
         WHERE p.run_id = only_run AND p.python_version IS NOT NULL
     ) AS p ON t.process_id = p.process_id
 ),
-busy AS (
-    SELECT DISTINCT run_id, thread_id FROM by_hand
-),
+busy AS (SELECT DISTINCT run_id, thread_id FROM by_hand),
 -- What a thread turned to: a message that it took by hand, or something else.
 turn AS (
     SELECT run_id, thread_id, event_id, take_id, subscription_id, taken_ns FROM by_hand
@@ -54,9 +49,7 @@ adjacent AS MATERIALIZED (
         a.publisher_id, a.trace_id, a.start_event_id, a.start_ns
     FROM alone AS a
     ASOF JOIN turn AS t
-        ON a.run_id = t.run_id
-        AND a.thread_id = t.thread_id
-        AND a.start_event_id > t.event_id
+        ON a.run_id = t.run_id AND a.thread_id = t.thread_id AND a.start_event_id > t.event_id
     WHERE t.take_id IS NOT NULL
 ),
 -- Requests and responses that the thread took. Only their times are stored, not their events.

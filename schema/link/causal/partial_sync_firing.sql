@@ -1,5 +1,3 @@
--- name: derive.partial_sync_firing
--- kind: macro
 -- description: Firings of partially synchronous annotations: callback instances of an input that
 --     publish on an output. All publications of one instance are one firing. It empties the
 --     caches, at some moment between the start of the instance and its first publication.

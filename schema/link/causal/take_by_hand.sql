@@ -1,12 +1,9 @@
--- name: derive.take_by_hand
--- kind: macro
 -- description: Takes of messages that no callback was called with.
 -- grain: one row per such take
 CREATE OR REPLACE MACRO derive.take_by_hand(only_run) AS TABLE
 SELECT
     t.run_id, t.take_id, t.subscription_id, t.trace_id, t.process_id, t.thread_id, t.taken_ns,
-    t.start_event_id,
-    t.is_loss_affected
+    t.start_event_id, t.is_loss_affected
 FROM store.take AS t
 ANTI JOIN (SELECT take_id FROM store.callback_instance WHERE run_id = only_run) AS i
     ON t.take_id = i.take_id

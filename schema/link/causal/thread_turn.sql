@@ -1,4 +1,3 @@
--- name: derive.thread_turn
 -- description: When a thread turns to something else, as far as executors and callbacks show it: a
 --     state of the executor begins, a callback begins or ends.
 -- grain: one row per thread and such moment

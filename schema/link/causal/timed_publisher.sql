@@ -1,5 +1,3 @@
--- name: derive.timed_publisher
--- kind: macro
 -- description: Publishers that a timer explains, among those that seem to answer takes without a
 --     callback. What a timer publishes comes when it is due, or as soon as the callback ends that
 --     kept it waiting. So nearly all comes after a moment, since the take, when the timer was due,

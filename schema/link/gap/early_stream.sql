@@ -1,4 +1,3 @@
--- name: derive.early_stream
 -- description: Streams of ROS events that end before others of their recording. `path` is that of
 --     the trace which ends last.
 -- grain: one row per such stream

@@ -1,4 +1,3 @@
--- name: derive.exposed_trace
 -- description: Traces whose recording has gaps.
 -- grain: one row per such trace
 SELECT run_id, trace_id, recording_id

@@ -1,4 +1,3 @@
--- name: derive.recording
 -- description: Traces that are one recording: the chunks of a rotated one, or the snapshots of one
 --     session.
 -- grain: one row per trace

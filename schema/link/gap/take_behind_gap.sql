@@ -1,5 +1,3 @@
--- name: derive.take_behind_gap
--- kind: macro
 -- description: Takes and publications with a gap of their recording in between: what else the
 --     thread took may be lost.
 -- grain: one row per such take and publication
@@ -12,6 +10,5 @@ FROM (
     FROM query_table(links) AS n
     JOIN derive.exposed_trace AS x ON n.trace_id = x.trace_id
 ) AS l
-ASOF JOIN derive.recording_gap AS g
-    ON l.recording_id = g.recording_id AND l.start_ns > g.start_ns
+ASOF JOIN derive.recording_gap AS g ON l.recording_id = g.recording_id AND l.start_ns > g.start_ns
 WHERE g.start_ns >= l.taken_ns OR g.covered_until_ns > l.taken_ns

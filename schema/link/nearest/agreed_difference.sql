@@ -1,5 +1,3 @@
--- name: derive.agreed_difference
--- kind: macro
 -- description: The differences of two clocks that may be the right one: those that nearly as many
 --     messages allow as the best one. They form ranges without a gap, a row each. In a range, the
 --     middle of what most messages allow is furthest from giving a message to another
@@ -22,9 +20,7 @@ level AS MATERIALIZED (
     WINDOW by_difference AS (PARTITION BY clock_id, stretch ORDER BY from_ns, step)
 ),
 most AS (
-    SELECT clock_id, stretch, max(vote_count) AS most_count
-    FROM level
-    GROUP BY clock_id, stretch
+    SELECT clock_id, stretch, max(vote_count) AS most_count FROM level GROUP BY clock_id, stretch
 ),
 high AS (
     SELECT l.clock_id, l.stretch, l.from_ns, l.until_ns, l.vote_count, m.most_count
@@ -56,8 +52,7 @@ best AS (
     FROM separated
 )
 SELECT
-    clock_id,
-    stretch,
+    clock_id, stretch,
     min(from_ns) AS least_ns,
     max(until_ns) AS greatest_ns,
     greatest(

@@ -1,5 +1,3 @@
--- name: derive.certain_clock
--- kind: macro
 -- description: Where the difference between the clock that stamps messages and that of the traces
 --     is certain. It is so between stretches of time that agree with it: in a stretch beside a
 --     step, or before one that is not known, the clock may have been set already. If a single
@@ -31,8 +29,7 @@ WITH told AS (
     )
 )
 SELECT
-    *,
-    is_known
+    *, is_known
     AND coalesce(
         last_value(CASE WHEN is_known THEN segment END IGNORE NULLS) OVER (
             on_clock ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING

@@ -1,5 +1,3 @@
--- name: derive.clock_drift
--- kind: macro
 -- description: How fast the difference of two clocks changes: the median of the slopes between
 --     stretches of time nearby (Theil-Sen), so that neither jumps nor single wrong differences
 --     count. Only differences of the same place are compared: those of two places may differ by a

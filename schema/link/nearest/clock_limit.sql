@@ -1,5 +1,3 @@
--- name: derive.clock_limit
--- kind: macro
 -- description: All numbers in the rules about the clock that stamps messages, and about messages
 --     that are matched by time; each with its reason.
 CREATE OR REPLACE MACRO derive.clock_limit() AS {

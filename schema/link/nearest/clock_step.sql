@@ -1,14 +1,10 @@
--- name: derive.clock_step
--- kind: macro
 -- description: When a clock that stamps messages was set, and from which difference to which. Until
 --     start_ns its difference is certain, and from end_ns on it is so again. If it is so on neither
 --     side or on one only, all that is known on the other is within the step. A stamp from a step
 --     may be by any of the differences that showed.
 -- grain: one row per clock and step, or steps with nothing certain between them
 CREATE OR REPLACE MACRO derive.clock_step(only_run) AS TABLE
-WITH known AS (
-    FROM derive.certain_clock(only_run) WHERE is_known
-),
+WITH known AS (FROM derive.certain_clock(only_run) WHERE is_known),
 turn AS (
     SELECT
         clock_id, segment, at_ns, difference_ns AS behind_ns,
@@ -20,8 +16,7 @@ turn AS (
     FROM (
         FROM known
         WINDOW by_clock AS (PARTITION BY clock_id)
-        QUALIFY is_certain
-            OR at_ns IN (min(at_ns) OVER by_clock, max(at_ns) OVER by_clock)
+        QUALIFY is_certain OR at_ns IN (min(at_ns) OVER by_clock, max(at_ns) OVER by_clock)
     )
     WINDOW on_clock AS (PARTITION BY clock_id ORDER BY at_ns)
 )

@@ -1,5 +1,3 @@
--- name: derive.close_pair
--- kind: macro
 -- description: Pairs of a message and a publication that may be its own, without those that the
 --     course of the clock rules out: no drift brings them near the difference of their stretch of
 --     time.

@@ -1,5 +1,3 @@
--- name: derive.followed_difference
--- kind: macro
 -- description: Which of the differences that messages agree with is the right one, from stretch
 --     to stretch. The clocks of one machine begin together (a few messages are enough to say so),
 --     and then drift: of the differences that a drift can lead to, the one that most messages
@@ -77,15 +75,12 @@ ballot AS MATERIALIZED (
 followed (
     clock_id, number, stretch, difference_ns, message_count, segment, since_stretch, is_begun
 ) AS (
-    SELECT
-        clock_id, 0::BIGINT, stretch, 0::BIGINT, 0::BIGINT, 0::BIGINT, stretch, false
+    SELECT clock_id, 0::BIGINT, stretch, 0::BIGINT, 0::BIGINT, 0::BIGINT, stretch, false
     FROM ballot
     WHERE number = 1
     UNION ALL
     SELECT
-        clock_id,
-        number,
-        stretch,
+        clock_id, number, stretch,
         coalesce(near.difference_ns, jump_ns, previous_ns),
         CASE
             WHEN near.difference_ns > latest_ns THEN 0

@@ -1,5 +1,3 @@
--- name: derive.nearest_message
--- kind: macro
 -- description: Messages matched with publications that carry no stamp. A message was stamped after
 --     its publication was written, and before the publishing thread went on; all writes on the
 --     topic that go on at that moment come into question. A message has one publication and a
@@ -16,12 +14,8 @@
 -- grain: one row per message that has, or might have, a publication
 -- when: store.stamp_clock
 CREATE OR REPLACE MACRO derive.nearest_message(only_run) AS TABLE
-WITH course AS MATERIALIZED (
-    FROM derive.certain_clock(only_run)
-),
-step AS MATERIALIZED (
-    FROM derive.clock_step(only_run)
-),
+WITH course AS MATERIALIZED (FROM derive.certain_clock(only_run)),
+step AS MATERIALIZED (FROM derive.clock_step(only_run)),
 started AS (
     SELECT
         * EXCLUDE (start_ns), start_ns AS first_ns,
@@ -35,8 +29,7 @@ started AS (
 located AS (
     SELECT
         b.run_id, b.clock_id, b.topic_name, b.publisher_id, b.thread_id, b.publication_id,
-        b.written_ns, b.next_event_ns, b.has_break, c.segment, c.is_certain,
-        c.difference_ns
+        b.written_ns, b.next_event_ns, b.has_break, c.segment, c.is_certain, c.difference_ns
         + round((b.written_ns - c.at_ns)::DOUBLE * c.drift_ppb / 1e9)::BIGINT AS then_ns,
         -- Where the drift is not known, it may be any that clocks have, also among the messages
         -- that vote.
@@ -90,9 +83,7 @@ segment AS MATERIALIZED (
     SELECT clock_id, NULL, start_ns + unnest(differences_ns), end_ns + unnest(differences_ns)
     FROM step
 ),
-publisher AS (
-    SELECT DISTINCT run_id, clock_id, topic_name, publisher_id FROM located
-),
+publisher AS (SELECT DISTINCT run_id, clock_id, topic_name, publisher_id FROM located),
 heard AS (
     SELECT
         m.run_id, m.topic_name, m.source_timestamp_ns, m.only_subscription_id, p.publisher_id,
@@ -157,8 +148,7 @@ beside AS (
 looked_up AS MATERIALIZED (
     SELECT
         topic_name, publisher_id, source_timestamp_ns, only_subscription_id, publication_id,
-        clock_id, goes_on,
-        is_crowded
+        clock_id, goes_on, is_crowded
         OR first_value(source_timestamp_ns) OVER of_publication < opens_ns
         OR coalesce(
             lead(source_timestamp_ns) OVER of_publication - source_timestamp_ns <= 2 * wander_ns,
@@ -215,8 +205,7 @@ exposed AS (
         WHERE topic_name IN (FROM strange)
     ) AS s ON p.topic_name = s.topic_name
     ANTI JOIN within AS w
-        ON p.publication_id = w.publication_id
-        AND s.only_subscription_id = w.only_subscription_id
+        ON p.publication_id = w.publication_id AND s.only_subscription_id = w.only_subscription_id
 ),
 -- How much of the time the publisher was writing: the more, the more messages fall into it by
 -- chance.
@@ -350,12 +339,8 @@ left_over AS (
         OR NOT o.is_usual
         OR (o.is_rivalled AND c.candidate_count = 1 AND c.is_prompt)
 ),
-hasty AS MATERIALIZED (
-    SELECT DISTINCT publication_id FROM left_over WHERE is_hasty
-),
-doubtful AS (
-    FROM derive.publication_beside_gap('hasty')
-),
+hasty AS MATERIALIZED (SELECT DISTINCT publication_id FROM left_over WHERE is_hasty),
+doubtful AS (FROM derive.publication_beside_gap('hasty')),
 matched AS (
     SELECT
         topic_name, publisher_id, source_timestamp_ns, only_subscription_id, publication_id,
@@ -403,9 +388,7 @@ trusted AS (
     GROUP BY clock_id, segment
 )
 SELECT
-    m.run_id,
-    m.topic_name,
-    m.source_timestamp_ns,
+    m.run_id, m.topic_name, m.source_timestamp_ns,
     CASE
         WHEN count(DISTINCT x.publication_id) = 1
             AND NOT bool_or(coalesce(x.is_rivalled, false))

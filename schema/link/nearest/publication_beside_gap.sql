@@ -1,5 +1,3 @@
--- name: derive.publication_beside_gap
--- kind: macro
 -- description: Publications with a gap of their recording between their begin and the next event
 --     of their thread, or, where there is no next event, until a message is surely written. The
 --     event that says who sent the message may be lost.
@@ -15,6 +13,5 @@ FROM (
     JOIN derive.exposed_trace AS x ON b.trace_id = x.trace_id
     WHERE b.publication_id IN (SELECT publication_id FROM query_table(publications))
 ) AS p
-ASOF JOIN derive.recording_gap AS g
-    ON p.recording_id = g.recording_id AND p.until_ns >= g.start_ns
+ASOF JOIN derive.recording_gap AS g ON p.recording_id = g.recording_id AND p.until_ns >= g.start_ns
 WHERE g.covered_until_ns >= p.start_ns

@@ -1,5 +1,3 @@
--- name: derive.sharp_difference
--- kind: macro
 -- description: The difference of two clocks that most messages of some stretches of time allow;
 --     the drift brings each message to the middle of one stretch. The difference is sharp, and
 --     tells messages apart that were published within microseconds, if nearly all messages allow
@@ -9,9 +7,7 @@
 -- param: course VARCHAR  Name of rows of clock_id, place, stretch, at_ns, offset_ns
 -- param: reach BIGINT  How many stretches before and behind count too
 CREATE OR REPLACE MACRO derive.sharp_difference(pairs, course, reach) AS TABLE
-WITH drift AS MATERIALIZED (
-    FROM derive.clock_drift(course)
-),
+WITH drift AS MATERIALIZED (FROM derive.clock_drift(course)),
 allowed AS (
     SELECT
         c.clock_id, c.stretch,

@@ -1,5 +1,3 @@
--- name: derive.stamp_clock
--- kind: macro
 -- description: How far the clock that stamps messages is from that of the traces, over time. In
 --     each stretch of time, the difference that most messages allow is followed from the stretch
 --     before. Where one difference explains a longer time, the clocks stood; between two such
@@ -10,9 +8,7 @@
 --     difference is not known
 -- when: derive.unstamped_call
 CREATE OR REPLACE MACRO derive.stamp_clock(only_run) AS TABLE
-WITH pair AS MATERIALIZED (
-    FROM derive.stamp_pair(only_run)
-),
+WITH pair AS MATERIALIZED (FROM derive.stamp_pair(only_run)),
 -- The stamp minus the time of the publication nearest to it changes as the difference of the clocks
 -- does, as long as the publication is at the same place of its period.
 latest AS (
@@ -24,9 +20,7 @@ latest AS (
     WHERE is_latest
     GROUP BY clock_id, publisher_id, stretch
 ),
-drift AS MATERIALIZED (
-    FROM derive.clock_drift('latest')
-),
+drift AS MATERIALIZED (FROM derive.clock_drift('latest')),
 extent AS (
     SELECT
         clock_id,
@@ -38,8 +32,7 @@ extent AS (
 ),
 -- No drift first, since most clocks of stamps have none and the slopes above may be of chance.
 allowed AS (
-    SELECT clock_id, 2 * stretch AS stretch, least_ns, greatest_ns
-    FROM pair
+    SELECT clock_id, 2 * stretch AS stretch, least_ns, greatest_ns FROM pair
     UNION ALL
     SELECT
         p.clock_id, 2 * p.stretch + 1,
@@ -54,9 +47,7 @@ agreed AS (
         clock_id, stretch // 2 AS stretch, least_ns, greatest_ns, difference_ns, vote_count,
         most_count
     FROM derive.agreed_difference('allowed')
-    QUALIFY rank() OVER (
-        PARTITION BY clock_id, stretch // 2 ORDER BY most_count DESC, stretch
-    ) = 1
+    QUALIFY rank() OVER (PARTITION BY clock_id, stretch // 2 ORDER BY most_count DESC, stretch) = 1
 ),
 origin AS (
     SELECT clock_id, stretch, avg(is_taken_here::INTEGER) >= 0.5 AS is_taken_here
@@ -71,9 +62,7 @@ region AS MATERIALIZED (
     JOIN origin AS o ON a.clock_id = o.clock_id AND a.stretch = o.stretch
     JOIN extent AS x ON a.clock_id = x.clock_id
 ),
-followed AS MATERIALIZED (
-    FROM derive.followed_difference('region')
-),
+followed AS MATERIALIZED (FROM derive.followed_difference('region')),
 course AS MATERIALIZED (
     SELECT
         f.clock_id, f.segment AS place, f.stretch, f.difference_ns AS offset_ns,
@@ -82,9 +71,7 @@ course AS MATERIALIZED (
     JOIN extent AS x ON f.clock_id = x.clock_id
     WHERE f.message_count > 0
 ),
-close AS MATERIALIZED (
-    FROM derive.close_pair('pair', 'course')
-),
+close AS MATERIALIZED (FROM derive.close_pair('pair', 'course')),
 -- Each vote makes the drift better known, so that the next vote can be of more stretches.
 beside AS MATERIALIZED (
     FROM derive.sharp_difference('close', 'course', derive.clock_limit().sharp_stretches // 2)
@@ -93,15 +80,12 @@ sharp AS MATERIALIZED (
     FROM derive.sharp_difference('close', 'beside', derive.clock_limit().sharp_stretches)
 ),
 chosen AS MATERIALIZED (
-    SELECT
-        c.clock_id, c.place, c.stretch, c.offset_ns, r.least_ns, r.greatest_ns, r.most_count
+    SELECT c.clock_id, c.place, c.stretch, c.offset_ns, r.least_ns, r.greatest_ns, r.most_count
     FROM course AS c
     JOIN region AS r
         ON c.clock_id = r.clock_id AND c.stretch = r.stretch AND c.offset_ns = r.difference_ns
 ),
-standing AS MATERIALIZED (
-    FROM derive.standing_difference('close', 'chosen')
-),
+standing AS MATERIALIZED (FROM derive.standing_difference('close', 'chosen')),
 -- Beside a small step, most of several stretches outvote what the messages of one say themselves.
 agreeing AS (
     SELECT
@@ -133,8 +117,7 @@ placed AS (
         )
 )
 SELECT
-    x.run_id,
-    f.clock_id,
+    x.run_id, f.clock_id,
     x.start_ns + f.stretch * x.stretch_ns + x.stretch_ns // 2 AS at_ns,
     x.start_ns + f.stretch * x.stretch_ns AS start_ns,
     x.start_ns + (f.stretch + 1) * x.stretch_ns AS end_ns,

@@ -1,5 +1,3 @@
--- name: derive.stamp_pair
--- kind: macro
 -- description: Messages beside publications that may be theirs. A stamp is made after the message
 --     was written and before the publishing thread went on, so each pair allows an interval of
 --     differences between the clock of stamps and that of the trace. If several publications
@@ -215,16 +213,9 @@ paired AS (
         AND p.written_ns <= coalesce(w.taken_ns, p.written_ns)
 )
 SELECT
-    run_id,
-    clock_id,
-    publisher_id,
-    start_ns,
-    stretch_ns,
-    stretch,
-    written_ns,
+    run_id, clock_id, publisher_id, start_ns, stretch_ns, stretch, written_ns,
     written_ns - start_ns - stretch * stretch_ns - stretch_ns // 2 AS beyond_middle_ns,
-    is_taken_here,
-    is_latest,
+    is_taken_here, is_latest,
     greatest(least_ns, later_ns, earlier_ns) AS least_ns,
     greatest_ns
 FROM paired

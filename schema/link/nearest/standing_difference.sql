@@ -1,5 +1,3 @@
--- name: derive.standing_difference
--- kind: macro
 -- description: Where two clocks stood in one relation, and in which. The clocks of one boot run at
 --     one rate and only step (clock_gettime(2)), so this is looked for before any drift. As long
 --     as the ranges of differences overlap from stretch to stretch, one difference may hold. It
@@ -35,9 +33,7 @@ allowed AS (
     JOIN span AS s ON p.clock_id = s.clock_id AND p.stretch = s.stretch
 ),
 agreed AS (
-    SELECT
-        clock_id, stretch AS place,
-        arg_max(a, (vote_count, difference_ns)) AS best
+    SELECT clock_id, stretch AS place, arg_max(a, (vote_count, difference_ns)) AS best
     FROM derive.agreed_difference('allowed') AS a
     GROUP BY clock_id, stretch
 ),

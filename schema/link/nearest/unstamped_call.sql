@@ -1,5 +1,3 @@
--- name: derive.unstamped_call
--- kind: macro
 -- description: publish() calls whose message can only be found by time: those of processes that
 --     never show the stamp of a message, and those of publishers for which the middleware has no
 --     event though nothing was lost (rmw_zenoh, which writes messages with buffers to several
@@ -33,8 +31,7 @@ WHERE run_id = only_run
     AND coalesce(rmw_ns, rcl_ns) IS NOT NULL
     AND process_id IN (FROM unstamped_process)
 UNION ALL
-SELECT
-    run_id, publication_id, publisher_id, process_id, thread_id, next_event_ns, rcl_ns, true
+SELECT run_id, publication_id, publisher_id, process_id, thread_id, next_event_ns, rcl_ns, true
 FROM unfinished
 WHERE publisher_id IN (SELECT publisher_id FROM unfinished WHERE NOT is_loss_affected)
     AND process_id NOT IN (FROM unstamped_process)

@@ -1,5 +1,3 @@
--- name: derive.unstamped_message
--- kind: macro
 -- description: Messages that were taken on the topics of publications without a stamp, unless a
 --     publication with their stamp is known. All takes of one message have its topic and stamp.
 --     Where the middleware has no event of writing, it may have written a message for each
@@ -17,8 +15,7 @@ stamped AS (
     FROM store.publication AS b
     LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
     LEFT JOIN topic AS w ON p.topic_name = w.topic_name
-    WHERE b.run_id = only_run
-        AND (w.topic_name IS NOT NULL OR p.topic_name IS NULL)
+    WHERE b.run_id = only_run AND (w.topic_name IS NOT NULL OR p.topic_name IS NULL)
 ),
 received AS (
     SELECT
@@ -30,17 +27,12 @@ received AS (
     WHERE t.run_id = only_run AND t.source_timestamp_ns <> 0
 )
 SELECT
-    r.run_id,
-    r.topic_name,
-    r.source_timestamp_ns,
-    r.only_subscription_id,
-    h.clock_id,
+    r.run_id, r.topic_name, r.source_timestamp_ns, r.only_subscription_id, h.clock_id,
     min(r.taken_ns) AS taken_ns
 FROM received AS r
 ANTI JOIN stamped AS x
     ON r.source_timestamp_ns = x.source_timestamp_ns AND r.topic_name = x.topic_name
-ANTI JOIN stamped AS y
-    ON r.source_timestamp_ns = y.source_timestamp_ns AND y.topic_name IS NULL
+ANTI JOIN stamped AS y ON r.source_timestamp_ns = y.source_timestamp_ns AND y.topic_name IS NULL
 JOIN store.process AS o ON r.process_id = o.process_id
 JOIN store.host AS h ON o.host_id = h.host_id
 GROUP BY r.run_id, r.topic_name, r.source_timestamp_ns, r.only_subscription_id, h.clock_id

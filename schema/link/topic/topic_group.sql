@@ -1,5 +1,3 @@
--- name: derive.topic_group
--- kind: macro
 -- description: Which publishers and subscriptions whose topic is not known are on one topic, as
 --     far as messages tell. A stamp that only one publication of the run has belongs to one
 --     message: its publisher and those who took it are on one topic. So are those of a message
@@ -23,9 +21,7 @@ WITH RECURSIVE endpoint AS (
     FROM store.subscription
     WHERE run_id = only_run
 ),
-concerned AS (
-    SELECT DISTINCT run_id FROM endpoint WHERE topic_name IS NULL
-),
+concerned AS (SELECT DISTINCT run_id FROM endpoint WHERE topic_name IS NULL),
 published AS (
     SELECT b.run_id, b.source_timestamp_ns, any_value(b.publisher_id) AS publisher_id
     FROM store.publication AS b
@@ -65,9 +61,7 @@ slot_use AS (
         lag(r.publication_id) OVER in_slot AS publication_id
     FROM store.ring_buffer_event AS r
     SEMI JOIN unknown_buffer AS u
-        ON r.run_id = u.run_id
-        AND r.process_id = u.process_id
-        AND r.buffer_handle = u.buffer_handle
+        ON r.run_id = u.run_id AND r.process_id = u.process_id AND r.buffer_handle = u.buffer_handle
     WHERE r.run_id = only_run
     WINDOW in_slot AS (
         PARTITION BY r.run_id, r.process_id, r.buffer_handle, r.slot ORDER BY r.event_id
@@ -76,8 +70,7 @@ slot_use AS (
 pair AS (
     SELECT p.publisher_id, t.subscription_id, count(*) AS message_count
     FROM published AS p
-    JOIN store.take AS t
-        ON p.run_id = t.run_id AND p.source_timestamp_ns = t.source_timestamp_ns
+    JOIN store.take AS t ON p.run_id = t.run_id AND p.source_timestamp_ns = t.source_timestamp_ns
     WHERE t.run_id = only_run AND p.publisher_id IS NOT NULL AND t.subscription_id IS NOT NULL
     GROUP BY p.publisher_id, t.subscription_id
     UNION ALL

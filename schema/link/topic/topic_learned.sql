@@ -1,5 +1,3 @@
--- name: derive.topic_learned
--- kind: macro
 -- description: Topics that messages tell of publishers and subscriptions whose initialisation was
 --     not traced.
 -- grain: one row per publisher or subscription without a topic of its own

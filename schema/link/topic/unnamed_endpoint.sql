@@ -1,5 +1,3 @@
--- name: derive.unnamed_endpoint
--- kind: macro
 -- description: Publishers and subscriptions whose topic the trace does not name, and what an entry
 --     of a file of links knows them by. A handle that occurs twice needs its process and host.
 -- grain: one row per publisher or subscription that was used, and not seen to be initialised
@@ -32,5 +30,4 @@ SELECT
 FROM counted AS e
 JOIN store.process AS p ON e.process_id = p.process_id
 JOIN store.host AS h ON p.host_id = h.host_id
-WHERE e.handle IS NOT NULL
-    AND (e.topic_name IS NULL OR e.is_topic_learned OR e.is_topic_declared)
+WHERE e.handle IS NOT NULL AND (e.topic_name IS NULL OR e.is_topic_learned OR e.is_topic_declared)

@@ -1,5 +1,3 @@
--- name: derive.link_transport
--- kind: macro
 -- description: Messages from publication to take, by every method. A self loop is a transform that
 --     is taken by the node that sent it, or by the transform listener of its process: no flow
 --     passes through it. Lost events cannot spoil a link by equal stamps and topics, or by the
@@ -38,14 +36,12 @@ guess AS (
         t.taken_ns
     FROM doubtful AS l
     JOIN (
-        SELECT * FROM store.publication
-        WHERE run_id = only_run AND EXISTS (SELECT 1 FROM doubtful)
+        SELECT * FROM store.publication WHERE run_id = only_run AND EXISTS (SELECT 1 FROM doubtful)
     ) AS b ON l.publication_id = b.publication_id
     JOIN store.process AS bp ON b.process_id = bp.process_id
     JOIN store.host AS bh ON bp.host_id = bh.host_id
     JOIN (
-        SELECT * FROM store.take
-        WHERE run_id = only_run AND EXISTS (SELECT 1 FROM doubtful)
+        SELECT * FROM store.take WHERE run_id = only_run AND EXISTS (SELECT 1 FROM doubtful)
     ) AS t ON l.take_id = t.take_id
     JOIN store.process AS tp ON t.process_id = tp.process_id
     JOIN store.host AS th ON tp.host_id = th.host_id
@@ -62,9 +58,7 @@ exposed AS (
         FROM guess AS q
         JOIN derive.exposed_trace AS x ON q.sender_trace_id = x.trace_id
     ) AS u
-    ASOF JOIN gap AS g
-        ON u.recording_id = g.recording_id
-        AND u.sent_until_ns >= g.start_ns
+    ASOF JOIN gap AS g ON u.recording_id = g.recording_id AND u.sent_until_ns >= g.start_ns
     WHERE g.covered_until_ns >= u.sent_ns
     UNION
     SELECT u.run_id, u.take_id
@@ -73,9 +67,7 @@ exposed AS (
         FROM guess AS q
         JOIN derive.exposed_trace AS x ON q.receiver_trace_id = x.trace_id
     ) AS u
-    ASOF JOIN gap AS g
-        ON u.recording_id = g.recording_id
-        AND u.taken_ns >= g.start_ns
+    ASOF JOIN gap AS g ON u.recording_id = g.recording_id AND u.taken_ns >= g.start_ns
     WHERE g.covered_until_ns >= u.received_from_ns
 ),
 intra_process AS (
@@ -134,8 +126,7 @@ copy AS (
     UNION
     SELECT l.take_id
     FROM link AS l
-    JOIN silent AS n
-        ON l.publisher_id = n.publisher_id AND l.subscription_id = n.subscription_id
+    JOIN silent AS n ON l.publisher_id = n.publisher_id AND l.subscription_id = n.subscription_id
     WHERE l.method <> 'ring_buffer'
 ),
 -- Of processes that are several with equal ids.
@@ -146,12 +137,7 @@ mixed_take AS (
         AND process_id IN (SELECT process_id FROM store.process WHERE is_ambiguous)
 )
 SELECT
-    l.run_id,
-    l.publication_id,
-    l.take_id,
-    l.publisher_id,
-    l.subscription_id,
-    l.method,
+    l.run_id, l.publication_id, l.take_id, l.publisher_id, l.subscription_id, l.method,
     greatest(
         l.candidate_count, CASE WHEN coalesce(mb.publication_id, mt.take_id) IS NOT NULL THEN 2 END
     ) AS candidate_count,
@@ -167,8 +153,7 @@ SELECT
     c.take_id IS NOT NULL AS is_copy
 FROM link AS l
 LEFT JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
-LEFT JOIN store.subscription AS s
-    ON l.subscription_id = s.subscription_id
+LEFT JOIN store.subscription AS s ON l.subscription_id = s.subscription_id
 LEFT JOIN store.node AS n ON s.node_id = n.node_id
 LEFT JOIN exposed AS x ON l.take_id = x.take_id
 LEFT JOIN copy AS c ON l.take_id = c.take_id

@@ -1,5 +1,3 @@
--- name: derive.link_transport_agnocast
--- kind: macro
 -- description: Messages through the shared memory of Agnocast, by their number, which counts on one
 --     topic of one kernel, that is of one clock. It needs no order: the event of a publication may
 --     come behind that of a take. When the last user of a topic ends, its numbers begin again. A
@@ -22,8 +20,7 @@ WITH published AS (
     WHERE e.run_id = only_run
 ),
 received AS (
-    SELECT
-        e.entry_id, t.take_id, t.subscription_id, t.taken_ns AS at_ns, s.topic_name, h.clock_id
+    SELECT e.entry_id, t.take_id, t.subscription_id, t.taken_ns AS at_ns, s.topic_name, h.clock_id
     FROM store.agnocast_entry AS e
     JOIN store.take AS t ON e.take_id = t.take_id
     JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
@@ -33,8 +30,7 @@ received AS (
 ),
 -- Publishers whose creation was not traced tell nothing.
 least AS (
-    SELECT
-        clock_id, topic_name, min(entry_id) AS entry_id, any_value(created_ns) AS created_ns
+    SELECT clock_id, topic_name, min(entry_id) AS entry_id, any_value(created_ns) AS created_ns
     FROM published
     WHERE created_ns IS NOT NULL
     GROUP BY clock_id, topic_name, publisher_id
@@ -67,14 +63,9 @@ candidate AS (
 )
 SELECT
     only_run::BIGINT AS run_id,
-    publication_id,
-    take_id,
-    publisher_id,
-    subscription_id,
+    publication_id, take_id, publisher_id, subscription_id,
     'agnocast' AS method,
     count(*) OVER (PARTITION BY take_id) AS candidate_count,
     false AS is_loss_affected
 FROM candidate
-QUALIFY row_number() OVER (
-    PARTITION BY take_id ORDER BY abs(at_ns - sent_ns), publication_id
-) = 1
+QUALIFY row_number() OVER (PARTITION BY take_id ORDER BY abs(at_ns - sent_ns), publication_id) = 1

@@ -1,5 +1,3 @@
--- name: derive.link_transport_exact
--- kind: macro
 -- description: Messages matched by equal, non-zero source stamps, and equal topics where both are
 --     known, whether from their own initialisation, or from other messages of the two or a file of
 --     links (then `exact_stamp`). If the topic of a side is not known, the pair counts only if the
@@ -53,15 +51,9 @@ repeated_take AS (
 ),
 candidate AS (
     SELECT
-        r.run_id,
-        r.take_id,
-        r.subscription_id,
-        r.source_timestamp_ns,
-        r.start_event_id AS take_event_id,
-        p.publication_id,
-        p.publisher_id,
-        p.start_event_id AS publication_event_id,
-        r.topic_name AS take_topic,
+        r.run_id, r.take_id, r.subscription_id, r.source_timestamp_ns,
+        r.start_event_id AS take_event_id, p.publication_id, p.publisher_id,
+        p.start_event_id AS publication_event_id, r.topic_name AS take_topic,
         coalesce(r.topic_name = p.topic_name, false) AS is_topic_known,
         CASE WHEN r.is_own_topic AND p.is_own_topic THEN 'exact' ELSE 'exact_stamp' END AS method,
         q.source_timestamp_ns IS NOT NULL OR u.source_timestamp_ns IS NOT NULL AS is_repeated

@@ -1,5 +1,3 @@
--- name: derive.link_transport_nearest
--- kind: macro
 -- description: Takes of the messages whose publication was found by time. A subscription takes a
 --     message once, and those of a publisher in the order in which they were published: what
 --     seems to be older than one taken before is not linked. The link is doubtful where events may
@@ -14,8 +12,7 @@ WITH received AS (
     FROM store.nearest_message AS m
     JOIN store.subscription AS s ON m.run_id = s.run_id AND m.topic_name = s.topic_name
     JOIN store.take AS t
-        ON s.subscription_id = t.subscription_id
-        AND m.source_timestamp_ns = t.source_timestamp_ns
+        ON s.subscription_id = t.subscription_id AND m.source_timestamp_ns = t.source_timestamp_ns
     WHERE m.run_id = only_run AND t.run_id = only_run
     QUALIFY row_number() OVER (
         PARTITION BY t.subscription_id, t.source_timestamp_ns ORDER BY t.take_id
@@ -37,11 +34,7 @@ sent AS MATERIALIZED (
     ) - b.end_ns <= derive.clock_limit().write_ns
 )
 SELECT
-    s.run_id,
-    s.publication_id,
-    s.take_id,
-    s.publisher_id,
-    s.subscription_id,
+    s.run_id, s.publication_id, s.take_id, s.publisher_id, s.subscription_id,
     'nearest' AS method,
     s.candidate_count,
     a.publication_id IS NOT NULL AS is_loss_affected

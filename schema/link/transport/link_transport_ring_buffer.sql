@@ -1,5 +1,3 @@
--- name: derive.link_transport_ring_buffer
--- kind: macro
 -- description: Messages between nodes of one process, by the slot of the ring buffer: what is
 --     taken out of a slot was put in last. Exceptions: the buffer was cleared or made anew
 --     meanwhile, or a gap of the trace may hide that the slot was used again. The slots are used
@@ -18,9 +16,7 @@ WITH slot_use AS (
         lag(publication_id) OVER in_slot AS publication_id
     FROM store.ring_buffer_event
     WHERE run_id = only_run AND kind <> 'clear'
-    WINDOW in_slot AS (
-        PARTITION BY run_id, process_id, buffer_handle, slot ORDER BY event_id
-    )
+    WINDOW in_slot AS (PARTITION BY run_id, process_id, buffer_handle, slot ORDER BY event_id)
 ),
 cleared AS (
     SELECT s.run_id, s.take_id
@@ -35,13 +31,11 @@ cleared AS (
     WHERE c.event_id > s.previous_event_id
 ),
 exposed AS (
-    SELECT
-        s.take_id, s.process_id, s.buffer_handle, s.at_ns, s.previous_ns, x.recording_id
+    SELECT s.take_id, s.process_id, s.buffer_handle, s.at_ns, s.previous_ns, x.recording_id
     FROM slot_use AS s
     JOIN derive.exposed_trace AS x ON s.trace_id = x.trace_id
     UNION ALL
-    SELECT
-        s.take_id, s.process_id, s.buffer_handle, s.at_ns, s.previous_ns, x.recording_id
+    SELECT s.take_id, s.process_id, s.buffer_handle, s.at_ns, s.previous_ns, x.recording_id
     FROM slot_use AS s
     JOIN derive.exposed_trace AS x ON s.previous_trace_id = x.trace_id
     WHERE s.previous_trace_id <> s.trace_id
@@ -49,8 +43,7 @@ exposed AS (
 behind_gap AS (
     SELECT e.take_id, e.process_id, e.buffer_handle, e.at_ns - e.previous_ns AS stay_ns
     FROM exposed AS e
-    ASOF JOIN derive.recording_gap AS g
-        ON e.recording_id = g.recording_id AND e.at_ns > g.start_ns
+    ASOF JOIN derive.recording_gap AS g ON e.recording_id = g.recording_id AND e.at_ns > g.start_ns
     WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns
 ),
 -- The time from one message put into a buffer to the next, where no gap lies in between.
@@ -63,9 +56,7 @@ filled AS (
     FROM slot_use AS e
     JOIN derive.exposed_trace AS x ON e.trace_id = x.trace_id
     WHERE e.kind = 'enqueue'
-        AND (e.process_id, e.buffer_handle) IN (
-            SELECT (process_id, buffer_handle) FROM behind_gap
-        )
+        AND (e.process_id, e.buffer_handle) IN (SELECT (process_id, buffer_handle) FROM behind_gap)
 ),
 pace AS (
     SELECT
@@ -90,11 +81,7 @@ doubtful AS (
     WHERE coalesce(g.stay_ns >= p.slot_count * p.shortest_ns, true)
 )
 SELECT
-    s.run_id,
-    s.publication_id,
-    s.take_id,
-    b.publisher_id,
-    t.subscription_id,
+    s.run_id, s.publication_id, s.take_id, b.publisher_id, t.subscription_id,
     'ring_buffer' AS method,
     1::BIGINT AS candidate_count,
     false AS is_loss_affected

@@ -1,4 +1,3 @@
--- name: staging.annotation
 -- description: Indirect links that the application declared, numbered as they were first. Those of
 --     a process with equal kind, inputs and outputs are one.
 -- grain: one row per declared indirect link

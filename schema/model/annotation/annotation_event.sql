@@ -1,4 +1,3 @@
--- name: staging.annotation_event
 -- description: Annotations of indirect links, as often as they were made.
 -- grain: one row per message_link event
 -- when: raw.ros2_message_link_approximate_sync, raw.ros2_message_link_partial_sync,

@@ -1,4 +1,3 @@
--- name: staging.annotation_input
 -- description: Subscriptions of annotations, as far as they are known.
 -- grain: one row per subscription of an annotation
 -- when: staging.annotation

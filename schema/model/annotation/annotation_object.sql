@@ -1,4 +1,3 @@
--- name: staging.annotation_object
 -- description: What the handles of annotations mean at the time of the annotation: the object
 --     initialised last before, else the one that was used but never seen to be initialised. A
 --     subscription without initialisation is known by the callback of its rclcpp object.

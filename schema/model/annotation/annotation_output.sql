@@ -1,4 +1,3 @@
--- name: staging.annotation_output
 -- description: Publishers of annotations, as far as they are known.
 -- grain: one row per publisher of an annotation
 -- when: staging.annotation

@@ -1,4 +1,3 @@
--- name: staging.agnocast_entry
 -- description: The number that Agnocast gave each message. It counts the messages of one topic on
 --     one kernel.
 -- grain: one row per publication or take of Agnocast

@@ -1,4 +1,3 @@
--- name: staging.agnocast_take
 -- description: Messages that Agnocast handed over, to a callback or to a poll. A poll without a
 --     message got nothing. `handle` tells subscriptions apart: the number of the callback, or the
 --     handle of the subscription that was polled.
@@ -17,8 +16,7 @@ callback AS (
 ),
 polled AS (
     SELECT
-        event_id, ts_ns, trace_index, thread_id, process_id, entry_id,
-        subscription_handle AS handle
+        event_id, ts_ns, trace_index, thread_id, process_id, entry_id, subscription_handle AS handle
     FROM staging.located('agnocast_agnocast_take')
     WHERE message <> 0
 ),

@@ -1,5 +1,3 @@
--- name: staging.call
--- kind: macro
 -- description: The events of one tracepoint that is a stage of calls, with what directly precedes
 --     each on its thread, unless a gap lies between the two.
 -- grain: one row per event of the tracepoint

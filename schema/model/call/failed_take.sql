@@ -1,4 +1,3 @@
--- name: staging.failed_take
 -- description: Attempts to take from a subscription that took nothing.
 -- grain: one row per rmw_take without a message
 -- when: raw.ros2_rmw_take
@@ -9,10 +8,7 @@ WITH failed AS (
 )
 SELECT
     f.trace_index + 1 AS trace_id,
-    s.subscription_id,
-    f.process_id,
-    f.thread_id,
-    f.ts_ns AS failed_ns
+    s.subscription_id, f.process_id, f.thread_id, f.ts_ns AS failed_ns
 FROM failed AS f
 ASOF JOIN staging.subscription_known AS k
     ON f.process_id = k.process_id

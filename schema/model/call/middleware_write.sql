@@ -1,14 +1,9 @@
--- name: staging.middleware_write
 -- description: What instrumented middleware says of one write: begin and end, in either order, or
 --     only one of them.
 -- grain: one row per write
 -- when: raw.dds_write, raw.dds_write_pre
-WITH write_begin AS (
-    SELECT * FROM staging.call('dds_write_pre')
-),
-write_end AS (
-    SELECT * FROM staging.call('dds_write')
-),
+WITH write_begin AS (SELECT * FROM staging.call('dds_write_pre')),
+write_end AS (SELECT * FROM staging.call('dds_write')),
 pair AS (
     SELECT b.event_id AS begin_event_id, e.event_id AS end_event_id
     FROM write_begin AS b

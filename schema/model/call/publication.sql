@@ -1,4 +1,3 @@
--- name: staging.publication
 -- kind: inline
 -- description: Publications, numbered in the order of their calls, with their publisher.
 -- grain: one row per publish() call
@@ -27,18 +26,8 @@ SELECT
     n.publication_id,
     c.trace_index + 1 AS trace_id,
     coalesce(p.publisher_id, i.publisher_id) AS publisher_id,
-    c.process_id,
-    c.thread_id,
-    c.start_ns,
-    c.end_ns,
-    c.intra_ns,
-    c.rclcpp_ns,
-    c.rcl_ns,
-    c.rmw_ns,
-    c.dds_ns,
-    c.source_timestamp_ns,
-    c.start_event_id,
-    c.end_event_id,
+    c.process_id, c.thread_id, c.start_ns, c.end_ns, c.intra_ns, c.rclcpp_ns, c.rcl_ns, c.rmw_ns,
+    c.dds_ns, c.source_timestamp_ns, c.start_event_id, c.end_event_id,
     CASE WHEN q.start_event_id IS NULL THEN c.callback_event_id ELSE q.callback_event_id END
         AS callback_event_id,
     l.start_event_id IS NOT NULL AS is_loss_affected,

@@ -1,4 +1,3 @@
--- name: staging.publication_call
 -- description: Layers of publish() calls stitched together. A layer continues the call only if it
 --     directly follows on the thread, comes from an earlier layer, and was given the same message.
 --     An intra-process publication and the inter-process one that directly follows it for the same
@@ -19,11 +18,8 @@ WITH client AS (
         coalesce(u.previous_callback_event_id, r.previous_callback_event_id)
             AS callback_event_id,
         coalesce(u.message, r.message) AS message,
-        u.previous_event_id AS intra_event_id,
-        u.ts_ns AS rclcpp_ns,
-        r.ts_ns AS rcl_ns,
-        u.publisher_handle AS rclcpp_handle,
-        r.publisher_handle AS rcl_handle
+        u.previous_event_id AS intra_event_id, u.ts_ns AS rclcpp_ns, r.ts_ns AS rcl_ns,
+        u.publisher_handle AS rclcpp_handle, r.publisher_handle AS rcl_handle
     FROM staging.call('ros2_rclcpp_publish') AS u
     FULL JOIN staging.call('ros2_rcl_publish') AS r
         ON u.event_id = r.previous_event_id AND u.message = r.message
@@ -38,9 +34,7 @@ middleware AS (
         coalesce(c.thread_index, m.thread_index) AS thread_index,
         coalesce(c.callback_event_id, m.previous_callback_event_id) AS callback_event_id,
         coalesce(c.message, m.message) AS message,
-        c.intra_event_id, c.rclcpp_ns, c.rcl_ns,
-        m.ts_ns AS rmw_ns,
-        c.rclcpp_handle, c.rcl_handle,
+        c.intra_event_id, c.rclcpp_ns, c.rcl_ns, m.ts_ns AS rmw_ns, c.rclcpp_handle, c.rcl_handle,
         m.rmw_publisher_handle AS rmw_handle,
         nullif(m.timestamp, 0)::BIGINT AS stamp
     FROM client AS c
@@ -133,23 +127,9 @@ complete AS (
         ON x.intra_event_id = i.start_event_id AND x.rcl_handle = i.publisher_handle
 )
 SELECT
-    w.start_event_id,
-    w.end_event_id,
-    w.trace_index,
-    c.thread_id,
-    c.process_id,
-    w.start_ns,
-    w.end_ns,
-    w.intra_ns,
-    w.rclcpp_ns,
-    w.rcl_ns,
-    w.rmw_ns,
-    w.dds_ns,
-    w.publisher_handle,
-    w.rmw_handle,
-    w.writer,
-    w.stamp AS source_timestamp_ns,
-    w.callback_event_id
+    w.start_event_id, w.end_event_id, w.trace_index, c.thread_id, c.process_id, w.start_ns,
+    w.end_ns, w.intra_ns, w.rclcpp_ns, w.rcl_ns, w.rmw_ns, w.dds_ns, w.publisher_handle,
+    w.rmw_handle, w.writer, w.stamp AS source_timestamp_ns, w.callback_event_id
 FROM complete AS w
 JOIN staging.context AS c
     ON w.thread_index = c.thread_index

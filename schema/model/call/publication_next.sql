@@ -1,4 +1,3 @@
--- name: staging.publication_next
 -- description: When the publishing thread went on after each publication without a stamp: what was
 --     stamped later is another message. Not known where the thread did nothing more, or where a
 --     gap may hide what it did.

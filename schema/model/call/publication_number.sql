@@ -1,4 +1,3 @@
--- name: staging.publication_number
 -- description: The number of each publication, in the order of the calls, and its publisher: by rcl
 --     handle, else rmw handle, else DDS writer, each as initialised last before the call. The rcl
 --     handle of /rosout is that of a temporary object. So a call may have no rclcpp layer, a handle
@@ -16,15 +15,9 @@ WITH call AS NOT MATERIALIZED (
 rcl_publisher AS (
     SELECT event_id, process_id, publisher_handle AS handle FROM staging.publisher_known
 ),
-rmw_publisher AS (
-    SELECT event_id, process_id, rmw_handle AS handle FROM staging.publisher_known
-),
-dds_writer AS (
-    SELECT event_id, process_id, writer AS handle FROM staging.publisher_known
-),
-by_rcl AS NOT MATERIALIZED (
-    SELECT * FROM staging.with_latest('call', 'rcl_publisher')
-),
+rmw_publisher AS (SELECT event_id, process_id, rmw_handle AS handle FROM staging.publisher_known),
+dds_writer AS (SELECT event_id, process_id, writer AS handle FROM staging.publisher_known),
+by_rcl AS NOT MATERIALIZED (SELECT * FROM staging.with_latest('call', 'rcl_publisher')),
 -- Few, as a rule, which are looked at twice.
 not_by_rcl AS MATERIALIZED (
     SELECT
@@ -47,15 +40,10 @@ rosout AS (
 ),
 resolved AS (
     SELECT
-        w.event_id,
-        w.process_id,
-        w.publisher_handle,
+        w.event_id, w.process_id, w.publisher_handle,
         coalesce(
-            w.rmw_event_id,
-            w.object_event_id,
-            CASE
-                WHEN w.may_be_rosout AND o.publisher_count = 1 THEN o.publisher_event_id
-            END
+            w.rmw_event_id, w.object_event_id,
+            CASE WHEN w.may_be_rosout AND o.publisher_count = 1 THEN o.publisher_event_id END
         ) AS publisher_event_id,
         w.may_be_rosout AND o.publisher_count > 1 AS is_rosout
     FROM staging.with_latest('by_rmw', 'dds_writer') AS w
@@ -66,18 +54,15 @@ published AS (
         event_id AS start_event_id,
         NULL::BIGINT AS process_id,
         NULL::UBIGINT AS unknown_handle,
-        object_event_id AS publisher_event_id,
-        false AS is_rosout
+        object_event_id AS publisher_event_id, false AS is_rosout
     FROM by_rcl
     WHERE object_event_id IS NOT NULL
     UNION ALL
     SELECT
-        event_id,
-        process_id,
+        event_id, process_id,
         CASE WHEN publisher_event_id IS NULL THEN publisher_handle END,
         publisher_event_id,
         coalesce(is_rosout, false)
     FROM resolved
 )
-SELECT *, row_number() OVER (ORDER BY start_event_id) AS publication_id
-FROM published
+SELECT *, row_number() OVER (ORDER BY start_event_id) AS publication_id FROM published

@@ -1,4 +1,3 @@
--- name: staging.ring_buffer_event
 -- description: What intra-process ring buffers were used for. An enqueue outside of any publish()
 --     call is the replay of a message that was kept for a subscription that joined late. A buffer
 --     that is made anew at an address is empty.
@@ -6,8 +5,7 @@
 -- when: raw.ros2_rclcpp_construct_ring_buffer, raw.ros2_rclcpp_ring_buffer_clear,
 --     raw.ros2_rclcpp_ring_buffer_dequeue, raw.ros2_rclcpp_ring_buffer_enqueue
 WITH enqueue AS (
-    SELECT
-        event_id, ts_ns, trace_index, process_id, thread_id, buffer, "index" AS slot, overwritten
+    SELECT event_id, ts_ns, trace_index, process_id, thread_id, buffer, "index" AS slot, overwritten
     FROM staging.located('ros2_rclcpp_ring_buffer_enqueue')
 ),
 published AS (
@@ -35,11 +33,9 @@ SELECT
 FROM staging.located('ros2_rclcpp_ring_buffer_dequeue') AS d
 LEFT JOIN staging.take_number AS t ON d.event_id = t.start_event_id
 UNION ALL
-SELECT
-    trace_index + 1, process_id, 'clear', buffer, NULL, ts_ns, NULL, NULL, false, event_id
+SELECT trace_index + 1, process_id, 'clear', buffer, NULL, ts_ns, NULL, NULL, false, event_id
 FROM staging.located('ros2_rclcpp_ring_buffer_clear')
 UNION ALL
-SELECT
-    trace_index + 1, process_id, 'clear', buffer, NULL, ts_ns, NULL, NULL, false, event_id
+SELECT trace_index + 1, process_id, 'clear', buffer, NULL, ts_ns, NULL, NULL, false, event_id
 FROM staging.located('ros2_rclcpp_construct_ring_buffer')
 ORDER BY event_id

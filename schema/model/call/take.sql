@@ -1,4 +1,3 @@
--- name: staging.take
 -- kind: inline
 -- description: Takes, numbered in the order in which they began, with their subscription.
 -- grain: one row per message handed over to a subscription
@@ -18,15 +17,8 @@ WITH every_take AS NOT MATERIALIZED (
 SELECT
     s.take_id,
     t.trace_index + 1 AS trace_id,
-    s.subscription_id,
-    t.process_id,
-    t.thread_id,
-    t.taken_ns,
-    t.source_timestamp_ns,
-    t.method,
-    t.start_event_id,
-    t.end_event_id,
-    s.callback_start_event_id,
+    s.subscription_id, t.process_id, t.thread_id, t.taken_ns, t.source_timestamp_ns, t.method,
+    t.start_event_id, t.end_event_id, s.callback_start_event_id,
     l.start_event_id IS NOT NULL AS is_loss_affected
 FROM every_take AS t
 JOIN staging.take_subscription AS s ON t.start_event_id = s.start_event_id

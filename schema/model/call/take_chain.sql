@@ -1,4 +1,3 @@
--- name: staging.take_chain
 -- description: Layers of one take stitched together, as for publications, and the subscription that
 --     took. A take whose rmw layer failed does not count, although upper layers may report it. Nor
 --     does a take of the middleware itself. It has no rcl layer, although rcl takes are traced. Its
@@ -14,17 +13,11 @@
 WITH middleware AS (
     SELECT
         coalesce(d.event_id, m.event_id) AS start_event_id,
-        m.event_id AS end_event_id,
-        m.trace_index,
-        m.thread_index,
-        m.message,
-        m.taken,
-        m.ts_ns AS rmw_ns,
-        m.rmw_subscription_handle AS rmw_handle,
+        m.event_id AS end_event_id, m.trace_index, m.thread_index, m.message, m.taken,
+        m.ts_ns AS rmw_ns, m.rmw_subscription_handle AS rmw_handle,
         nullif(m.source_timestamp, 0) AS stamp
     FROM staging.call('ros2_rmw_take') AS m
-    LEFT JOIN raw.dds_read AS d
-        ON m.previous_event_id = d.event_id AND m.message = d.buffer
+    LEFT JOIN raw.dds_read AS d ON m.previous_event_id = d.event_id AND m.message = d.buffer
 ),
 rcl AS (
     SELECT
@@ -56,9 +49,7 @@ chain AS (
         coalesce(c.event_id, r.end_event_id) AS end_event_id,
         coalesce(r.trace_index, c.trace_index) AS trace_index,
         coalesce(r.thread_index, c.thread_index) AS thread_index,
-        r.taken, r.rmw_ns, r.rcl_ns,
-        c.ts_ns AS caret_ns,
-        r.rmw_handle,
+        r.taken, r.rmw_ns, r.rcl_ns, c.ts_ns AS caret_ns, r.rmw_handle,
         coalesce(r.stamp, nullif(c.source_stamp, 0)::BIGINT) AS stamp
     FROM rclcpp AS r
     FULL JOIN staging.call('ros2_dispatch_subscription_callback') AS c
@@ -75,28 +66,19 @@ located AS (
         AND h.start_event_id < c.until_event_id
     WHERE h.taken IS DISTINCT FROM 0
 ),
-rcl_reader AS (
-    SELECT DISTINCT process_id, rmw_handle FROM located WHERE rcl_ns IS NOT NULL
-),
+rcl_reader AS (SELECT DISTINCT process_id, rmw_handle FROM located WHERE rcl_ns IS NOT NULL),
 known_reader AS (
     SELECT process_id, rmw_handle FROM staging.subscription_known
     UNION
     SELECT process_id, rmw_handle FROM rcl_reader
 ),
-rcl_traced AS (
-    SELECT DISTINCT process_id FROM rcl_reader
-),
+rcl_traced AS (SELECT DISTINCT process_id FROM rcl_reader),
 taken AS (
     SELECT
-        t.start_event_id AS event_id,
-        t.end_event_id,
-        t.trace_index,
-        t.thread_id,
-        t.process_id,
+        t.start_event_id AS event_id, t.end_event_id, t.trace_index, t.thread_id, t.process_id,
         coalesce(t.rmw_ns, t.rcl_ns, t.caret_ns) AS taken_ns,
         CASE WHEN t.rmw_ns IS NULL AND t.rcl_ns IS NULL THEN 'caret' ELSE 'rmw' END AS method,
-        t.rmw_handle AS handle,
-        t.stamp
+        t.rmw_handle AS handle, t.stamp
     FROM located AS t
     LEFT JOIN rcl_traced AS r ON t.process_id = r.process_id
     LEFT JOIN known_reader AS k ON t.process_id = k.process_id AND t.rmw_handle = k.rmw_handle
@@ -108,9 +90,7 @@ taken AS (
             AND (k.process_id IS NOT NULL OR r.process_id IS NULL)
         )
 ),
-subscription AS (
-    SELECT event_id, process_id, rmw_handle AS handle FROM staging.subscription_known
-),
+subscription AS (SELECT event_id, process_id, rmw_handle AS handle FROM staging.subscription_known),
 buffer AS (
     SELECT b.event_id, b.process_id, b.buffer, o.subscription_event_id
     FROM staging.located('ros2_rclcpp_buffer_to_ipb') AS b
@@ -122,8 +102,7 @@ SELECT
     event_id AS start_event_id, end_event_id, trace_index, thread_id, process_id, taken_ns, method,
     handle AS rmw_handle,
     NULL::UBIGINT AS buffer_handle,
-    stamp AS source_timestamp_ns,
-    object_event_id AS subscription_event_id,
+    stamp AS source_timestamp_ns, object_event_id AS subscription_event_id,
     object_event_id IS NOT NULL AS is_known
 FROM staging.with_latest('taken', 'subscription')
 UNION ALL

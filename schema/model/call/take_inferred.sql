@@ -1,4 +1,3 @@
--- name: staging.take_inferred
 -- description: The subscription of messages that did not come through the middleware, where its
 --     initialisation was not traced: that of the ring buffer, else of the callback that was handed
 --     the message without a traced take. A callback that none was traced for is a subscription of
@@ -19,9 +18,7 @@ dequeue AS (
     FROM staging.take_chain AS t
     JOIN staging.buffer_owner AS o
         ON t.process_id = o.process_id AND t.buffer_handle = o.buffer_handle
-    WHERE t.method = 'ring_buffer'
-        AND NOT t.is_known
-        AND o.subscription_event_id IS NOT NULL
+    WHERE t.method = 'ring_buffer' AND NOT t.is_known AND o.subscription_event_id IS NOT NULL
 ),
 callback AS (
     SELECT process_id, callback_handle, callback_event_id, min(start_event_id) AS event_id
@@ -35,8 +32,7 @@ handed AS (
             AS subscription_event_id,
         bool_and(d.is_inferred) AS is_inferred
     FROM staging.callback_binding AS b
-    SEMI JOIN callback AS c
-        ON b.process_id = c.process_id AND b.callback_handle = c.callback_handle
+    SEMI JOIN callback AS c ON b.process_id = c.process_id AND b.callback_handle = c.callback_handle
     LEFT JOIN dequeue AS d ON b.take_event_id = d.start_event_id
     WHERE b.take_event_id IS NOT NULL
     GROUP BY b.process_id, b.callback_handle, b.callback_event_id

@@ -1,4 +1,3 @@
--- name: staging.take_number
 -- description: The number of each take, in the order in which they began, and the callback that it
 --     led to. A subscription callback that ran without any take traced was handed its message all
 --     the same: then both are the same. The subscription may be known from either.
@@ -23,5 +22,4 @@ every_take AS (
     FROM run
     WHERE take_event_id IS NULL AND (kind = 'subscription' OR is_intra_process)
 )
-SELECT *, row_number() OVER (ORDER BY start_event_id) AS take_id
-FROM every_take
+SELECT *, row_number() OVER (ORDER BY start_event_id) AS take_id FROM every_take

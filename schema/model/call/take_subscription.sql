@@ -1,4 +1,3 @@
--- name: staging.take_subscription
 -- description: The subscription of each take: by rmw handle or ring buffer, else by the callback
 --     that it led to, known or not.
 -- grain: one row per message handed over to a subscription

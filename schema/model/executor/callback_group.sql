@@ -1,11 +1,9 @@
--- name: staging.callback_group
 -- description: Callback groups (CARET), with the executors that they were added to.
 -- grain: one row per callback group and executor
 -- when: staging.callback_group_owner
 SELECT
     row_number() OVER (ORDER BY g.event_id) AS callback_group_id,
-    g.process_id,
-    x.executor_id,
+    g.process_id, x.executor_id,
     coalesce(g.kind, 'unknown') AS kind,
     g.event_id
 FROM staging.callback_group_owner AS g

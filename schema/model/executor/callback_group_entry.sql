@@ -1,4 +1,3 @@
--- name: staging.callback_group_entry
 -- description: Callbacks in callback groups (CARET), and the executor of each. A group usually is
 --     filled before it is added to an executor; else it was added to it last.
 -- grain: one row per callback in a callback group
@@ -20,8 +19,7 @@ object AS (
     SELECT event_id, process_id, 'subscription', subscription_handle, subscription_id
     FROM staging.subscription
     UNION ALL
-    SELECT event_id, process_id, 'service', service_handle, service_id
-    FROM staging.service
+    SELECT event_id, process_id, 'service', service_handle, service_id FROM staging.service
     UNION ALL
     -- Copies of services of managed nodes.
     SELECT k.event_id, k.process_id, 'service', k.service_handle, s.service_id
@@ -31,14 +29,12 @@ object AS (
 ),
 filled AS (
     SELECT
-        e.event_id,
-        e.kind,
+        e.event_id, e.kind,
         coalesce(
             max(CASE WHEN o.event_id <= e.event_id THEN o.event_id END), min(o.event_id)
         ) AS object_event_id
     FROM entry AS e
-    JOIN object AS o
-        ON e.process_id = o.process_id AND e.kind = o.kind AND e.handle = o.handle
+    JOIN object AS o ON e.process_id = o.process_id AND e.kind = o.kind AND e.handle = o.handle
     GROUP BY e.event_id, e.kind
 ),
 owned AS (

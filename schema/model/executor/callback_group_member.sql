@@ -1,4 +1,3 @@
--- name: staging.callback_group_member
 -- description: Callbacks of the callback groups.
 -- grain: one row per callback in a callback group
 -- when: staging.callback_group_entry

@@ -1,10 +1,8 @@
--- name: staging.callback_group_owner
 -- description: Which executors callback groups were added to (CARET), directly or by way of the
 --     collector of entities of an executor. An address means what was there last before; what is
 --     reported late may come in any order, then what was there first after.
 -- grain: one row per callback group and executor
--- when: raw.ros2_caret_add_callback_group,
---     raw.ros2_caret_add_callback_group_static_executor,
+-- when: raw.ros2_caret_add_callback_group, raw.ros2_caret_add_callback_group_static_executor,
 --     raw.ros2_caret_callback_group_to_executor_entity_collector
 WITH collected AS (
     SELECT event_id, process_id, executor_addr, entities_collector_addr
@@ -28,8 +26,7 @@ nearest_collector AS (
         ) AS collected_event_id
     FROM to_collector AS a
     JOIN collected AS c
-        ON a.process_id = c.process_id
-        AND a.entities_collector_addr = c.entities_collector_addr
+        ON a.process_id = c.process_id AND a.entities_collector_addr = c.entities_collector_addr
     GROUP BY a.event_id
 ),
 added AS (
@@ -54,9 +51,7 @@ owned AS (
 )
 SELECT
     min(event_id) AS event_id,
-    process_id,
-    callback_group_addr,
-    executor_event_id,
+    process_id, callback_group_addr, executor_event_id,
     arg_min(group_type_name, event_id) AS kind
 FROM owned
 GROUP BY process_id, callback_group_addr, executor_event_id

@@ -1,4 +1,3 @@
--- name: staging.executor
 -- description: Executors. Stock traces do not name them: there they are deduced from their threads.
 --     One thread with executor events is a single-threaded executor. One without is an events
 --     executor if it was seen to serve what came first first, else it may be any.
@@ -21,9 +20,7 @@ WITH deduced AS (
 ),
 every_executor AS (
     SELECT
-        d.first_thread_id,
-        d.process_id,
-        d.executor_event_id,
+        d.first_thread_id, d.process_id, d.executor_event_id,
         CASE WHEN x.kind <> 'unknown' THEN x.kind ELSE d.kind END AS kind,
         x.event_id IS NULL AS is_inferred
     FROM deduced AS d
@@ -35,9 +32,5 @@ every_executor AS (
 )
 SELECT
     row_number() OVER (ORDER BY first_thread_id NULLS LAST, executor_event_id) AS executor_id,
-    process_id,
-    kind,
-    is_inferred,
-    first_thread_id,
-    executor_event_id
+    process_id, kind, is_inferred, first_thread_id, executor_event_id
 FROM every_executor

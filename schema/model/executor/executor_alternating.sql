@@ -1,4 +1,3 @@
--- name: staging.executor_alternating
 -- description: Threads of one executor that its lock shows: the threads of a process take turns in
 --     waiting for work, and no two of them ever wait at once. Threads of several executors do.
 -- grain: one row per such thread

@@ -1,4 +1,3 @@
--- name: staging.executor_callback
 -- description: The first callback instance after an event of an executor, with no begin or end of
 --     a callback between the two. A step of its own, so that only these few columns are in memory
 --     when states look it up.

@@ -1,4 +1,3 @@
--- name: staging.executor_event
 -- kind: inline
 -- description: What executors say of themselves, with what they said before on the same thread;
 --     before `from_event_id` that was another life of the process. These are most of the events of
@@ -21,13 +20,8 @@ WITH event AS (
     FROM raw.ros2_rclcpp_executor_execute
 )
 SELECT
-    e.event_id,
-    e.ts_ns,
-    c.thread_id,
-    e.kind,
-    e.previous_executor_event_id AS previous_event_id,
-    e.previous_executor_ts_ns AS previous_ns,
-    e.previous_executor_label AS previous_kind,
+    e.event_id, e.ts_ns, c.thread_id, e.kind, e.previous_executor_event_id AS previous_event_id,
+    e.previous_executor_ts_ns AS previous_ns, e.previous_executor_label AS previous_kind,
     c.from_event_id
 FROM event AS e
 JOIN staging.context AS c

@@ -1,8 +1,5 @@
--- name: staging.executor_first
 -- description: Where the executor of each thread is first heard of.
 -- grain: one row per thread with executor events
 -- when: raw.ros2_rclcpp_executor_get_next_ready, raw.ros2_rclcpp_executor_wait_for_work,
 --     raw.ros2_rclcpp_executor_execute
-SELECT thread_id, min(event_id) AS event_id
-FROM staging.executor_event
-GROUP BY thread_id
+SELECT thread_id, min(event_id) AS event_id FROM staging.executor_event GROUP BY thread_id

@@ -1,4 +1,3 @@
--- name: staging.executor_in_order
 -- description: Threads that serve what came first first, as events executors do: of two messages
 --     of two subscriptions that both waited, the older one was always taken first, in both orders
 --     of the subscriptions. A wait set has one order of subscriptions: of 24 real executors with

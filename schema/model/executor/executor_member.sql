@@ -1,4 +1,3 @@
--- name: staging.executor_member
 -- description: Which threads work for the same executor: those of a process that execute callbacks
 --     of an executor that names itself, else the same callbacks, directly or through others, or
 --     that take turns in waiting for work. The smallest thread of such a group stands for it.
@@ -50,9 +49,7 @@ tie AS (
     UNION
     SELECT other_thread_id, thread_id FROM neighbour
 ),
-spinning AS (
-    SELECT thread_id FROM staging.executor_first
-),
+spinning AS (SELECT thread_id FROM staging.executor_first),
 member AS (
     SELECT thread_id FROM runs
     UNION
@@ -69,9 +66,7 @@ labelled (thread_id, first_thread_id) USING KEY (thread_id) AS (
     GROUP BY t.other_thread_id
 )
 SELECT
-    l.thread_id,
-    t.process_id,
-    l.first_thread_id,
+    l.thread_id, t.process_id, l.first_thread_id,
     s.thread_id IS NOT NULL AS is_spinning,
     m.executor_event_id
 FROM labelled AS l

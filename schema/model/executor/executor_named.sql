@@ -1,4 +1,3 @@
--- name: staging.executor_named
 -- description: Executors that name themselves (CARET), or are named by a thread that works for
 --     them (Python). Of some, only the address is known, since their construction was not traced.
 -- grain: one row per executor
@@ -13,14 +12,12 @@ WITH constructed AS (
     FROM staging.located('ros2_caret_construct_static_executor')
 ),
 used AS (
-    SELECT event_id, process_id, executor_addr
-    FROM staging.located('ros2_caret_add_callback_group')
+    SELECT event_id, process_id, executor_addr FROM staging.located('ros2_caret_add_callback_group')
     UNION ALL
     SELECT event_id, process_id, executor_addr
     FROM staging.located('ros2_caret_executor_entity_collector_to_executor')
 )
-SELECT event_id, process_id, executor_addr, coalesce(kind, 'unknown') AS kind
-FROM constructed
+SELECT event_id, process_id, executor_addr, coalesce(kind, 'unknown') AS kind FROM constructed
 UNION ALL
 SELECT min(u.event_id), u.process_id, u.executor_addr, 'unknown'
 FROM used AS u

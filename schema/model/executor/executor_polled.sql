@@ -1,4 +1,3 @@
--- name: staging.executor_polled
 -- description: Threads that poll their executor (spin_some): most of their waits have a timeout of
 --     0. How many, and of how many.
 -- grain: one row per thread

@@ -1,4 +1,3 @@
--- name: staging.executor_thread
 -- description: Threads of the executors.
 -- grain: one row per thread of an executor
 -- when: staging.executor_member

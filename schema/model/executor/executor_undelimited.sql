@@ -1,4 +1,3 @@
--- name: staging.executor_undelimited
 -- description: Threads whose executor states have no begin or no end: the recording leaves out one
 --     of the two events between which executors wait, so another state would seem to last.
 -- grain: one row per thread with executor events

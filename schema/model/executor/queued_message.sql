@@ -1,4 +1,3 @@
--- name: staging.queued_message
 -- description: Messages that threads without executor events took for callbacks, with the one
 --     publication of that stamp on the same host: with its end, and when its thread published next
 --     or ended a callback, since publish() had returned by then. What was published before the
@@ -7,9 +6,7 @@
 -- when: staging.take_chain WHERE source_timestamp_ns IS NOT NULL AND
 --     thread_id NOT IN (SELECT thread_id FROM staging.executor_first)
 WITH enabled AS (
-    SELECT trace_index
-    FROM staging.declared
-    WHERE name = 'ros2:rclcpp_executor_get_next_ready'
+    SELECT trace_index FROM staging.declared WHERE name = 'ros2:rclcpp_executor_get_next_ready'
 ),
 began AS (
     SELECT thread_id, min(start_ns) AS start_ns FROM staging.callback_pair GROUP BY thread_id

@@ -1,4 +1,3 @@
--- name: staging.gap
 -- description: Gaps of the traces: what was lost of them, and when nothing was recorded. A packet
 --     counts the events that were lost since the packet before it ended, on its CPU. They were lost
 --     behind its own last event, until it ended. Where the next packet is opened late, since there
@@ -32,12 +31,10 @@ lossy_packet AS (
 ),
 lost_event AS (
     SELECT
-        trace_id,
-        cpu_id AS cpu,
+        trace_id, cpu_id AS cpu,
         'loss' AS kind,
         coalesce(last_event_ns, begin_ns) AS start_ns,
-        known_end_ns AS end_ns,
-        discarded_event_count AS event_count
+        known_end_ns AS end_ns, discarded_event_count AS event_count
     FROM lossy_packet
     WHERE NOT (is_instant AND is_opened_late)
     UNION ALL
@@ -51,8 +48,7 @@ lost_event AS (
 ),
 lost_packet AS (
     SELECT
-        trace_id,
-        cpu_id AS cpu,
+        trace_id, cpu_id AS cpu,
         'packets' AS kind,
         least(coalesce(previous_end_ns, recording_begin_ns), begin_ns) AS start_ns,
         begin_ns AS end_ns,
@@ -98,8 +94,7 @@ every_gap AS (
     SELECT trace_id, NULL, 'pause', start_ns, end_ns, NULL FROM staging.pause
 )
 SELECT
-    g.trace_id, g.cpu, g.kind, g.start_ns, g.end_ns, g.event_count,
-    s.recording_index,
+    g.trace_id, g.cpu, g.kind, g.start_ns, g.end_ns, g.event_count, s.recording_index,
     coalesce(g.cpu, -1) AS cpu_id,
     max(g.end_ns) OVER (PARTITION BY s.recording_index, g.cpu ORDER BY g.start_ns)
         AS covered_until_ns,

@@ -1,4 +1,3 @@
--- name: staging.loss_affected
 -- description: Publications, takes and callback instances that a gap may have cut or mixed. A gap
 --     lies right before them or inside. A gap right behind counts as well, but not behind an
 --     instance that was seen to end. A gap of other CPUs counts inside, as the thread may have
@@ -70,9 +69,7 @@ extent AS (
     FROM staging.callback_run
 ),
 elsewhere AS (
-    SELECT thread_id, event_id
-    FROM staging.near_gap
-    WHERE sequence = 'call' AND NOT is_between
+    SELECT thread_id, event_id FROM staging.near_gap WHERE sequence = 'call' AND NOT is_between
 ),
 exposed AS MATERIALIZED (
     SELECT *

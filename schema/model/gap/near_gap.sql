@@ -1,4 +1,3 @@
--- name: staging.near_gap
 -- description: Events with a gap between themselves and their predecessor in a sequence of their
 --     thread. The sequence 'thread' has all events of a thread. `is_between`: the gap is on the CPU
 --     of either event, or a pause, and so interrupts the record of the thread. Else it is on other
@@ -64,8 +63,7 @@ near AS (
         e.event_id, e.thread_index, e.sequence, e.recording_index, e.ts_ns, e.cpu_id,
         e.previous_ns, e.previous_cpu_id
     FROM candidate AS e
-    ASOF JOIN staging.gap AS g
-        ON e.recording_index = g.recording_index AND e.ts_ns > g.start_ns
+    ASOF JOIN staging.gap AS g ON e.recording_index = g.recording_index AND e.ts_ns > g.start_ns
     WHERE g.start_ns >= e.previous_ns OR g.any_covered_until_ns > e.previous_ns
 ),
 place AS (

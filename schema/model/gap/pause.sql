@@ -1,4 +1,3 @@
--- name: staging.pause
 -- description: Silences in which nothing was recorded: tracing had been stopped. All streams of a
 --     recording are silent at once between packets, for a millisecond or longer. A silence is a
 --     pause where it can be nothing else: packets of one trace ended before they were full, not at
@@ -11,16 +10,10 @@
 --     AND begin_ns <= last_begin_ns
 
 -- Kernel traces pause no process.
-WITH packet AS (
-    SELECT * FROM staging.packet WHERE domain IS DISTINCT FROM 'kernel'
-),
+WITH packet AS (SELECT * FROM staging.packet WHERE domain IS DISTINCT FROM 'kernel'),
 covered AS (
     SELECT
-        trace_id,
-        recording_index,
-        begin_ns,
-        covered_until_ns,
-        last_begin_ns,
+        trace_id, recording_index, begin_ns, covered_until_ns, last_begin_ns,
         max(CASE WHEN is_ended_early THEN end_ns END) OVER earlier AS ended_early_ns,
         -- LTTng opens a chunk with an empty packet of every stream that has no event in it yet.
         max(
@@ -47,10 +40,7 @@ covered AS (
 -- the session recorded, and stopping would have written further ones.
 silent AS (
     SELECT
-        trace_id,
-        recording_index,
-        covered_until_ns AS start_ns,
-        begin_ns AS end_ns,
+        trace_id, recording_index, covered_until_ns AS start_ns, begin_ns AS end_ns,
         -- Packets of one trace ended before they were full.
         coalesce(ended_early_ns = covered_until_ns, false)
         AND coalesce(previous_trace_id = trace_id, false) AS is_flushed
@@ -61,10 +51,7 @@ silent AS (
 ),
 -- When packets were ended before they were full.
 ending AS (
-    SELECT recording_index, end_ns
-    FROM packet
-    WHERE is_ended_early
-    GROUP BY recording_index, end_ns
+    SELECT recording_index, end_ns FROM packet WHERE is_ended_early GROUP BY recording_index, end_ns
 ),
 -- One for all streams, which are ended one after the other.
 flush AS (
@@ -142,9 +129,7 @@ usual AS (
         unnest(range(q.start_ns // 1_000_000_000, q.end_ns // 1_000_000_000 + 1)) AS second
     FROM quiet AS q
     ANTI JOIN silence AS s
-        ON q.recording_index = s.recording_index
-        AND q.start_ns < s.end_ns
-        AND q.end_ns > s.start_ns
+        ON q.recording_index = s.recording_index AND q.start_ns < s.end_ns AND q.end_ns > s.start_ns
 ),
 explained AS (
     SELECT s.recording_index, s.start_ns

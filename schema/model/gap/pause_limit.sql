@@ -1,5 +1,3 @@
--- name: staging.pause_limit
--- kind: macro
 -- description: What silences of a trace are taken to be like. All numbers that the rules of pauses
 --     know are here, each with its reason.
 CREATE OR REPLACE MACRO staging.pause_limit() AS {

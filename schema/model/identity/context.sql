@@ -1,4 +1,3 @@
--- name: staging.context
 -- description: Threads within the life of their process. An event is of the thread and process of
 --     the row that has its thread index, and in whose stretch of event ids it lies.
 -- grain: one row per thread of a process life
@@ -34,8 +33,7 @@ lived AS (
 -- A stretch that two lives share has to be looked at event by event.
 divided AS (
     SELECT
-        v.thread_index,
-        v.life,
+        v.thread_index, v.life,
         min(e.event_id) AS first_event_id,
         max(e.event_id) AS last_event_id,
         min(e.ts_ns) AS first_seen_ns,

@@ -1,4 +1,3 @@
--- name: staging.foreign_endpoint
 -- description: Publishers and subscriptions of ids under which objects of several processes were
 --     made: all GIDs that Fast DDS gives to a process begin with the same eight bytes, two of them
 --     random. `gap_ns`: begin of the first gap behind it.
@@ -25,10 +24,8 @@ identified AS (
     WINDOW process AS (PARTITION BY t.process)
     QUALIFY min(prefix) OVER process < max(prefix) OVER process
 )
-SELECT
-    i.process, i.event_id, i.handle, i.prefix, min(g.start_ns) AS gap_ns
+SELECT i.process, i.event_id, i.handle, i.prefix, min(g.start_ns) AS gap_ns
 FROM identified AS i
 JOIN staging.placed_source AS r ON i.trace_index = r.trace_index
-LEFT JOIN staging.gap AS g
-    ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns
+LEFT JOIN staging.gap AS g ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns
 GROUP BY ALL

@@ -1,5 +1,3 @@
--- name: staging.located
--- kind: macro
 -- description: The events of one tracepoint with the thread and process that they happened in.
 -- grain: one row per event of the tracepoint
 CREATE OR REPLACE MACRO staging.located(tracepoint) AS TABLE

@@ -1,4 +1,3 @@
--- name: staging.mixed_process
 -- description: Ids that several processes have at one time, whose events nothing tells apart.
 --     Either a thread was on two CPUs at one moment. Or an object of one process was made or used
 --     after another process had made its first. What is used behind a gap proves nothing: its
@@ -23,9 +22,7 @@ object AS (
     FROM raw.ros2_rcl_publisher_init AS p
     JOIN suspect AS s ON p.thread_index = s.thread_index
     ASOF JOIN staging.foreign_endpoint AS e
-        ON s.process = e.process
-        AND p.rmw_publisher_handle = e.handle
-        AND p.event_id >= e.event_id
+        ON s.process = e.process AND p.rmw_publisher_handle = e.handle AND p.event_id >= e.event_id
 ),
 used AS (
     SELECT event_id, ts_ns, thread_index, publisher_handle AS handle FROM raw.ros2_rcl_publish

@@ -1,4 +1,3 @@
--- name: staging.node
 -- description: Nodes. A handle that objects name but that was never initialised in the trace gets
 --     a row without a name. Nodes of several processes may have one name at a time (two robots, two
 --     domains): behind it stands the host then, or the process, or both.
@@ -6,14 +5,9 @@
 -- when: raw.ros2_rcl_node_init, staging.node_use
 WITH known AS (
     SELECT
-        event_id,
-        process_id,
-        node_name AS name,
-        namespace,
+        event_id, process_id, node_name AS name, namespace,
         namespace || CASE WHEN namespace LIKE '%/' THEN '' ELSE '/' END || node_name AS full_name,
-        node_handle,
-        ts_ns AS created_ns,
-        false AS is_inferred
+        node_handle, ts_ns AS created_ns, false AS is_inferred
     FROM staging.located('ros2_rcl_node_init')
 ),
 unknown AS (
@@ -38,8 +32,7 @@ every_node AS (
     FROM unknown
 ),
 lived AS (
-    SELECT
-        process_id, host_id, vpid, min(first_seen_ns) AS first_ns, max(last_seen_ns) AS last_ns
+    SELECT process_id, host_id, vpid, min(first_seen_ns) AS first_ns, max(last_seen_ns) AS last_ns
     FROM staging.context
     GROUP BY process_id, host_id, vpid
 ),
@@ -71,9 +64,7 @@ placed AS (
 )
 SELECT
     row_number() OVER (ORDER BY event_id) AS node_id,
-    process_id,
-    name,
-    namespace,
+    process_id, name, namespace,
     full_name || coalesce(
         '@' || nullif(
             concat_ws(
@@ -90,8 +81,5 @@ SELECT
         ),
         ''
     ) AS full_name,
-    node_handle,
-    created_ns,
-    is_inferred,
-    event_id
+    node_handle, created_ns, is_inferred, event_id
 FROM placed

@@ -1,4 +1,3 @@
--- name: staging.node_use
 -- description: Which initialisation of a node handle each object belongs to: the latest before it.
 --     Any later one is better than none. A publisher may be created inside its node, right before
 --     the node's own event: before Jazzy /rosout is. It belongs to the one right after. Where a
@@ -46,9 +45,7 @@ use AS (
     FROM construction
     WHERE kind <> 'node'
 ),
-node_init AS (
-    SELECT event_id, process_id, node_handle FROM construction WHERE kind = 'node'
-),
+node_init AS (SELECT event_id, process_id, node_handle FROM construction WHERE kind = 'node'),
 earlier AS (
     SELECT u.event_id, n.event_id AS node_event_id
     FROM use AS u
@@ -66,9 +63,7 @@ later AS (
         AND u.event_id <= n.event_id
 )
 SELECT
-    u.event_id,
-    u.process_id,
-    u.node_handle,
+    u.event_id, u.process_id, u.node_handle,
     CASE
         WHEN u.precedes_own_node THEN l.node_event_id
         ELSE coalesce(e.node_event_id, l.node_event_id)

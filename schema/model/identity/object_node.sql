@@ -1,4 +1,3 @@
--- name: staging.object_node
 -- description: The node of each object, by the event that initialised the object.
 -- grain: one row per object or timer link that names a node
 -- when: staging.node_use

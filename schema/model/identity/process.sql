@@ -1,4 +1,3 @@
--- name: staging.process
 -- description: Process lives. The name is that of the main thread (tid = pid), else of the first
 --     thread seen; the version is what rcl_init stated, for display only. The tracer of Python
 --     nodes says that of Python.
@@ -6,15 +5,8 @@
 -- when: staging.context
 WITH process AS (
     SELECT
-        process_id,
-        host_id,
-        pid_ns,
-        vpid,
-        life,
-        coalesce(
-            any_value(name) FILTER (WHERE vtid = vpid),
-            arg_min(name, first_event_id)
-        ) AS name,
+        process_id, host_id, pid_ns, vpid, life,
+        coalesce(any_value(name) FILTER (WHERE vtid = vpid), arg_min(name, first_event_id)) AS name,
         min(first_seen_ns) AS first_seen_ns,
         max(last_seen_ns) AS last_seen_ns
     FROM staging.context
@@ -26,15 +18,8 @@ version AS (
     GROUP BY process_id
 )
 SELECT
-    p.process_id,
-    p.host_id,
-    p.vpid AS pid,
-    p.name,
-    v.tracetools_version,
-    y.python_version,
-    p.first_seen_ns,
-    p.last_seen_ns,
-    p.pid_ns AS pid_namespace,
+    p.process_id, p.host_id, p.vpid AS pid, p.name, v.tracetools_version, y.python_version,
+    p.first_seen_ns, p.last_seen_ns, p.pid_ns AS pid_namespace,
     p.life::INTEGER AS life,
     m.vpid IS NOT NULL AS is_ambiguous
 FROM process AS p

@@ -1,4 +1,3 @@
--- name: staging.process_restart
 -- description: Where a pid begins a new life. That is an rcl_init which is not the first event of
 --     its process, in three cases. (1) Its context handle was initialised before. (2) It is the
 --     first one recorded, and a publisher was made or a callback was seen before it. (3) The main
@@ -15,13 +14,7 @@
 -- `is_other_main`: another thread, or another process name, than that of the rcl_init before.
 WITH every_initialisation AS (
     SELECT
-        p.host_id,
-        p.pid_ns,
-        p.vpid,
-        p.vtid,
-        i.event_id,
-        i.ts_ns,
-        i.trace_index,
+        p.host_id, p.pid_ns, p.vpid, p.vtid, i.event_id, i.ts_ns, i.trace_index,
         lag(p.vtid) OVER process IS DISTINCT FROM p.vtid
         OR lag(p.procname) OVER process IS DISTINCT FROM p.procname AS is_other_main,
         row_number() OVER context > 1 AS is_same_context,
@@ -31,9 +24,7 @@ WITH every_initialisation AS (
         ON i.thread_index = p.thread_index AND i.event_id >= p.first_event_id
     WINDOW
         process AS (PARTITION BY p.host_id, p.pid_ns, p.vpid ORDER BY i.event_id),
-        context AS (
-            PARTITION BY p.host_id, p.pid_ns, p.vpid, i.context_handle ORDER BY i.event_id
-        )
+        context AS (PARTITION BY p.host_id, p.pid_ns, p.vpid, i.context_handle ORDER BY i.event_id)
 ),
 -- Most are the first event of their process. `gap_ns`: begin of the first gap behind it.
 initialisation AS (
@@ -47,9 +38,7 @@ initialisation AS (
     )
     GROUP BY ALL
 ),
-thread AS (
-    SELECT DISTINCT thread_index, host_id, pid_ns, vpid, vtid FROM staging.thread_presence
-),
+thread AS (SELECT DISTINCT thread_index, host_id, pid_ns, vpid, vtid FROM staging.thread_presence),
 -- A callback that starts was registered, whether that was recorded or not. A publication shows no
 -- object: what logs to /rosout publishes on a handle that is never made.
 handled AS (
@@ -61,11 +50,9 @@ handled AS (
     SELECT thread_index, event_id, ts_ns, callback, true, true
     FROM raw.ros2_rclcpp_callback_register
     UNION ALL
-    SELECT thread_index, event_id, ts_ns, publisher_handle, false, false
-    FROM raw.ros2_rcl_publish
+    SELECT thread_index, event_id, ts_ns, publisher_handle, false, false FROM raw.ros2_rcl_publish
     UNION ALL
-    SELECT thread_index, event_id, ts_ns, callback, false, true
-    FROM raw.ros2_callback_start
+    SELECT thread_index, event_id, ts_ns, callback, false, true FROM raw.ros2_callback_start
 ),
 -- Objects from before an initialisation: when they are first used after it, and made again.
 old AS (
@@ -86,9 +73,7 @@ old AS (
 -- before and ends afterwards: the life goes on. The thread that initialises again is that of the
 -- new life. Where the first initialisation is not known, it may do so inside a callback.
 surviving AS (
-    SELECT event_id
-    FROM old
-    WHERE used_event_id < coalesce(made_event_id, 9223372036854775807)
+    SELECT event_id FROM old WHERE used_event_id < coalesce(made_event_id, 9223372036854775807)
     UNION
     SELECT c.event_id
     FROM initialisation AS c

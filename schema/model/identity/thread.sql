@@ -1,4 +1,3 @@
--- name: staging.thread
 -- description: Threads of all processes.
 -- grain: one row per thread
 -- when: staging.context

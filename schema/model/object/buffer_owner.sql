@@ -1,4 +1,3 @@
--- name: staging.buffer_owner
 -- description: Subscriptions of ring buffers whose initialisation was not traced: what is taken out
 --     of a buffer is for the callback that directly follows. One callback is one subscription,
 --     which may be known; else it is a placeholder by the first dequeue. Where several callbacks
@@ -41,8 +40,7 @@ buffer AS (
     GROUP BY process_id, buffer_handle
 )
 SELECT
-    b.process_id,
-    b.buffer_handle,
+    b.process_id, b.buffer_handle,
     CASE
         WHEN r.subscription_count = 1 AND r.known_count = r.callback_count
             THEN r.subscription_event_id

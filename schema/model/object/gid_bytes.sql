@@ -1,5 +1,3 @@
--- name: staging.gid_bytes
--- kind: macro
 -- description: A recorded GID as 16 bytes, NULL where it is absent or all zeros. Longer arrays end
 --     in garbage in several distributions.
 CREATE OR REPLACE MACRO staging.gid_bytes(gid) AS

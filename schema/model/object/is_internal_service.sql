@@ -1,5 +1,3 @@
--- name: staging.is_internal_service
--- kind: macro
 -- description: Whether a service is infrastructure of ROS: parameters, lifecycle, type description.
 CREATE OR REPLACE MACRO staging.is_internal_service(service_name) AS
 coalesce(

@@ -1,5 +1,3 @@
--- name: staging.is_internal_topic
--- kind: macro
 -- description: Whether a topic is infrastructure of ROS rather than of the application.
 CREATE OR REPLACE MACRO staging.is_internal_topic(topic_name) AS
 coalesce(

@@ -1,4 +1,3 @@
--- name: staging.publisher
 -- description: Publishers. A handle that was published on but never initialised in the trace gets a
 --     row without topic, or with /rosout where nothing else is possible.
 -- grain: one row per publisher
@@ -13,14 +12,9 @@ WITH every_publisher AS (
         min(start_event_id),
         process_id,
         CASE WHEN bool_and(is_rosout) THEN '/rosout' END,
-        unknown_handle,
-        NULL,
-        NULL,
-        NULL,
-        NULL,
+        unknown_handle, NULL, NULL, NULL, NULL,
         bool_and(is_rosout),
-        true,
-        false
+        true, false
     FROM staging.publication_number
     WHERE unknown_handle IS NOT NULL
     GROUP BY process_id, unknown_handle

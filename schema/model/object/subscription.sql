@@ -1,4 +1,3 @@
--- name: staging.subscription
 -- description: Subscriptions. A handle that messages were taken with but that was never
 --     initialised in the trace gets a row without topic, as does the reader of a ring buffer.
 -- grain: one row per subscription

@@ -1,22 +1,14 @@
--- name: staging.subscription_known
 -- description: Subscriptions whose rcl initialisation was traced, with rmw handle and GID.
 -- grain: one row per rcl_subscription_init
 -- when: raw.ros2_rcl_subscription_init
 WITH rmw_init AS (
-    SELECT
-        event_id, ts_ns, process_id, rmw_subscription_handle,
-        staging.gid_bytes(gid) AS gid
+    SELECT event_id, ts_ns, process_id, rmw_subscription_handle, staging.gid_bytes(gid) AS gid
     FROM staging.located('ros2_rmw_subscription_init')
 )
 SELECT
-    s.event_id,
-    s.process_id,
-    s.thread_id,
-    s.topic_name,
-    s.subscription_handle,
+    s.event_id, s.process_id, s.thread_id, s.topic_name, s.subscription_handle,
     nullif(s.rmw_subscription_handle, 0) AS rmw_handle,
-    r.gid,
-    s.queue_depth,
+    r.gid, s.queue_depth,
     least(s.ts_ns, r.ts_ns) AS created_ns,
     staging.is_internal_topic(s.topic_name) AS is_internal,
     coalesce(s.rmw_subscription_handle = 0, false) AS is_agnocast

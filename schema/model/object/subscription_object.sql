@@ -1,4 +1,3 @@
--- name: staging.subscription_object
 -- description: Which rcl subscription each rclcpp subscription object belongs to; one rcl handle
 --     has two objects where intra-process communication is on. An object that is asked for belongs
 --     to its initialisation in the same construction (since the thread's last

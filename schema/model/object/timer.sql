@@ -1,4 +1,3 @@
--- name: staging.timer
 -- description: Timers. The node is linked after the timer was made (since Galactic). One that was
 --     used but never initialised in the trace gets a row without period.
 -- grain: one row per timer

@@ -1,4 +1,3 @@
--- name: staging.timer_use
 -- description: Which timer each event means that names an rcl timer handle: the one initialised
 --     last before, else a placeholder by the first use of the handle.
 -- grain: one row per event that attaches a callback (`has_callback`) or a node to a timer; an event
@@ -12,8 +11,7 @@ WITH use AS (
     FROM staging.located('ros2_rclcpp_timer_link_node')
 ),
 resolved AS (
-    SELECT
-        u.event_id, u.process_id, u.timer_handle, u.has_callback, i.event_id AS known_event_id
+    SELECT u.event_id, u.process_id, u.timer_handle, u.has_callback, i.event_id AS known_event_id
     FROM use AS u
     ASOF LEFT JOIN staging.located('ros2_rcl_timer_init') AS i
         ON u.process_id = i.process_id
@@ -21,9 +19,7 @@ resolved AS (
         AND u.event_id >= i.event_id
 )
 SELECT
-    event_id,
-    process_id,
-    timer_handle,
+    event_id, process_id, timer_handle,
     coalesce(
         known_event_id,
         min(CASE WHEN known_event_id IS NULL THEN event_id END) OVER (

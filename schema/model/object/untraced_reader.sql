@@ -1,4 +1,3 @@
--- name: staging.untraced_reader
 -- description: Readers that an instrumented DDS created for topics of ROS, in processes without a
 --     subscription of that topic: of a program without ROS, or of a node whose own events are not
 --     recorded.

@@ -1,14 +1,10 @@
--- name: staging.with_latest
--- kind: macro
 -- description: Uses of handles, each with the object of that handle that was initialised last
 --     before it, in its process. Both are the names of tables with an event_id, process_id and
 --     handle; uses may have other columns as well.
 -- grain: one row per use; `object_event_id` is NULL where no such object was initialised before
 CREATE OR REPLACE MACRO staging.with_latest(uses, objects) AS TABLE
 WITH object AS (
-    SELECT event_id, process_id, handle
-    FROM query_table(objects)
-    WHERE handle IS NOT NULL
+    SELECT event_id, process_id, handle FROM query_table(objects) WHERE handle IS NOT NULL
 ),
 by_handle AS (
     SELECT process_id, handle, min(event_id) AS first_event_id, count(*) > 1 AS is_repeated

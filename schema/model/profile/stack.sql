@@ -1,4 +1,3 @@
--- name: staging.stack
 -- description: Stacks of calls, with the function that ran.
 -- grain: one row per different stack
 -- when: staging.stack_text

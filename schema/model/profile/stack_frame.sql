@@ -1,4 +1,3 @@
--- name: staging.stack_frame
 -- description: Functions that samples of stacks saw.
 -- grain: one row per function and file
 -- when: staging.stack_text

@@ -1,4 +1,3 @@
--- name: staging.stack_sample
 -- description: Samples of the processes that have events, while they had any. A sample is of the
 --     innermost callback instance on its thread at its time: of those that began the last, unless
 --     it was over; else the nearest one around that which was not. One that is not seen to end

@@ -1,4 +1,3 @@
--- name: staging.stack_text
 -- description: What perf wrote of each stack, and its calls, the outermost first. Where a function
 --     keeps no frame pointer, what comes above it in the stack is no code: it is cut off. Python
 --     names its functions as 'py::function:file', in a map of its own: C++ may have a namespace py.

@@ -1,4 +1,3 @@
--- name: staging.clock
 -- description: Clocks by uuid (LTTng: the boot). A trace without one has a clock of its own, by
 --     hostname. No correction is known at ingest.
 -- grain: one row per clock

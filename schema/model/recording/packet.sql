@@ -1,4 +1,3 @@
--- name: staging.packet
 -- description: Packets as read. One that opens without a begin is taken to begin with its trace.
 --     `covered_until_ns`: when all earlier packets of the recording were over. `last_begin_ns`:
 --     when its last packet with events begins.

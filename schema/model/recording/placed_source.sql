@@ -1,4 +1,3 @@
--- name: staging.placed_source
 -- description: Traces with the numbers of their clock, host and recording. A recording is one
 --     trace, or all chunks or snapshots of one. A kernel trace is of the clock and host that its
 --     schedule tells; all others are as recorded. `shift_ns` has to be added to the times of a

@@ -1,4 +1,3 @@
--- name: staging.simulated_time
 -- description: What time it was in the simulation, as CARET's clock recorder said.
 -- grain: one row per ros2_caret:sim_time
 -- when: raw.ros2_caret_sim_time

@@ -1,4 +1,3 @@
--- name: staging.trace
 -- description: Traces read, with what their packets and events say of their extent.
 -- grain: one row per CTF trace
 -- when: staging.placed_source
@@ -24,11 +23,7 @@ with_requests AS (
 )
 SELECT
     s.trace_index + 1 AS trace_id,
-    s.host_id,
-    s.path,
-    s.uuid,
-    s.tracer,
-    s.domain,
+    s.host_id, s.path, s.uuid, s.tracer, s.domain,
     coalesce(e.start_ns, s.begin_ns) + s.shift_ns AS start_ns,
     coalesce(e.end_ns, s.end_ns) + s.shift_ns AS end_ns,
     coalesce(e.event_count, 0) AS event_count,

@@ -1,4 +1,3 @@
--- name: staging.client
 -- description: Service clients. A handle that was used but never initialised in the trace gets a
 --     row without node, and the name of the service that it turned out to call.
 -- grain: one row per client
@@ -20,13 +19,7 @@ every_client AS (
 )
 SELECT
     row_number() OVER (ORDER BY c.event_id) AS client_id,
-    c.process_id,
-    n.node_id,
-    c.service_name,
-    c.client_handle,
-    c.rmw_handle,
-    g.gid,
-    c.created_ns,
+    c.process_id, n.node_id, c.service_name, c.client_handle, c.rmw_handle, g.gid, c.created_ns,
     staging.is_internal_service(c.service_name) AS is_internal,
     c.event_id
 FROM every_client AS c

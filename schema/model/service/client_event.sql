@@ -1,4 +1,3 @@
--- name: staging.client_event
 -- description: Requests that clients sent and responses that they took, each with its client.
 -- grain: one row per rmw_send_request or successful rmw_take_response
 -- when: raw.ros2_rmw_send_request, raw.ros2_rmw_take_response
@@ -14,9 +13,7 @@ WITH event AS NOT MATERIALIZED (
     FROM raw.ros2_rmw_take_response
     WHERE taken IS DISTINCT FROM 0
 ),
-client AS (
-    SELECT event_id, process_id, rmw_handle AS handle FROM staging.client_known
-)
+client AS (SELECT event_id, process_id, rmw_handle AS handle FROM staging.client_known)
 SELECT
     event_id, ts_ns, thread_id, process_id, is_request, handle AS rmw_handle, sequence_number,
     source_timestamp_ns, object_event_id AS client_event_id, is_inferred

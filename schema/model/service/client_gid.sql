@@ -1,4 +1,3 @@
--- name: staging.client_gid
 -- description: The GID of each client. One whose initialisation was not traced learns it from the
 --     responses that it took: the number and stamp of a response tell which was sent to it.
 -- grain: one row per client with a GID

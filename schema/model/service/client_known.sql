@@ -1,4 +1,3 @@
--- name: staging.client_known
 -- description: Service clients whose initialisation was traced, with the GID by which servers know
 --     them (since Kilted).
 -- grain: one row per rcl_client_init
@@ -8,13 +7,8 @@ WITH rmw_init AS (
     FROM staging.located('ros2_rmw_client_init')
 )
 SELECT
-    c.event_id,
-    c.process_id,
-    c.service_name,
-    c.client_handle,
-    c.rmw_client_handle AS rmw_handle,
-    r.gid,
-    c.ts_ns AS created_ns
+    c.event_id, c.process_id, c.service_name, c.client_handle, c.rmw_client_handle AS rmw_handle,
+    r.gid, c.ts_ns AS created_ns
 FROM staging.located('ros2_rcl_client_init') AS c
 ASOF LEFT JOIN rmw_init AS r
     ON c.process_id = r.process_id

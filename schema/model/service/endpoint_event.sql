@@ -1,5 +1,3 @@
--- name: staging.endpoint_event
--- kind: macro
 -- description: What clients, or services, sent and took, each with its client or service: the one
 --     of that handle initialised last before, else a placeholder by the first use of the handle.
 --     Both are the names of tables: events as recorded, with the rmw `handle` they are of, and the
@@ -14,9 +12,7 @@ WITH located AS NOT MATERIALIZED (
         AND e.event_id >= c.from_event_id
         AND e.event_id < c.until_event_id
 ),
-resolved AS NOT MATERIALIZED (
-    FROM staging.with_latest('located', objects)
-),
+resolved AS NOT MATERIALIZED (FROM staging.with_latest('located', objects)),
 first_use AS (
     SELECT process_id, handle, min(event_id) AS event_id
     FROM resolved

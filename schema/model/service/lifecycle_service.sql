@@ -1,4 +1,3 @@
--- name: staging.lifecycle_service
 -- description: Services of managed nodes, by the callbacks that were added to them. The state
 --     machine of such a node initialises its services, and rclcpp_lifecycle gives rclcpp copies of
 --     them. So the handles that the callbacks are added to are initialised nowhere. Order tells:
@@ -28,9 +27,7 @@ service AS (
     FROM initialised AS i
     ANTI JOIN (FROM added WHERE is_own) AS a ON i.event_id = a.init_event_id
     ASOF JOIN machine AS m
-        ON i.thread_id = m.thread_id
-        AND i.node_handle = m.node_handle
-        AND i.event_id <= m.event_id
+        ON i.thread_id = m.thread_id AND i.node_handle = m.node_handle AND i.event_id <= m.event_id
 ),
 callback AS (
     SELECT m.event_id AS machine_event_id, a.event_id
@@ -52,9 +49,7 @@ numbered AS (
 SELECT c.event_id, s.event_id AS service_event_id
 FROM numbered AS c
 JOIN numbered AS s
-    ON c.machine_event_id = s.machine_event_id
-    AND c.position = s.position
-    AND c.number = s.number
+    ON c.machine_event_id = s.machine_event_id AND c.position = s.position AND c.number = s.number
 WHERE c.kind = 'callback'
     AND s.kind = 'service'
     -- rcl_lifecycle makes five: to change state, and four to ask for what there is.

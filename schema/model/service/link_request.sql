@@ -1,4 +1,3 @@
--- name: staging.link_request
 -- description: Requests and the callback instance that sent them; NULL where the thread did so by
 --     itself.
 -- grain: one row per request that was seen to be sent

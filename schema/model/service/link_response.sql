@@ -1,4 +1,3 @@
--- name: staging.link_response
 -- description: Responses and what they came from: the instance of the service callback that was
 --     called with the request, and, where the response was sent later in another instance, that
 --     one too.

@@ -1,4 +1,3 @@
--- name: staging.request_origin
 -- description: Every request with what was traced of it, numbered in the order of sending: both
 --     ends, or only one, and the instance of the service callback.
 -- grain: one row per request and service that took it; one per request that no service took
@@ -27,15 +26,11 @@ SELECT
     row_number() OVER (
         ORDER BY coalesce(f.send_event_id, f.take_event_id), f.take_event_id
     ) AS request_id,
-    f.send_event_id,
-    f.take_event_id,
-    b.start_event_id AS callback_start_event_id,
+    f.send_event_id, f.take_event_id, b.start_event_id AS callback_start_event_id,
     coalesce(c.client_event_id, g.client_event_id) AS client_event_id,
     s.service_event_id,
     coalesce(c.sequence_number, s.sequence_number) AS sequence_number,
-    c.ts_ns AS sent_ns,
-    s.ts_ns AS taken_ns,
-    c.thread_id AS sender_thread_id,
+    c.ts_ns AS sent_ns, s.ts_ns AS taken_ns, c.thread_id AS sender_thread_id,
     s.thread_id AS receiver_thread_id
 FROM found AS f
 LEFT JOIN staging.client_event AS c ON f.send_event_id = c.event_id

@@ -1,4 +1,3 @@
--- name: staging.request_pair
 -- description: Requests as they were sent and taken: by the client's GID and its number. Every
 --     service of the name may take it. Where a client came again with the same GID and numbers,
 --     the response tells which request it was, else the order, if as many were taken by a service
@@ -17,10 +16,7 @@ taken AS (
     WHERE is_request AND gid IS NOT NULL
 ),
 repeated AS (
-    SELECT gid, sequence_number
-    FROM sent
-    GROUP BY gid, sequence_number
-    HAVING count(*) > 1
+    SELECT gid, sequence_number FROM sent GROUP BY gid, sequence_number HAVING count(*) > 1
     UNION
     SELECT gid, sequence_number
     FROM taken

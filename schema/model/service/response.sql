@@ -1,4 +1,3 @@
--- name: staging.response
 -- description: Responses with what was traced of each, numbered in the order of sending, and the
 --     request that each answers. A side that was not traced is NULL.
 -- grain: one row per response
@@ -31,9 +30,7 @@ single_gid AS (
     HAVING count(*) = 1
 ),
 answered AS (
-    SELECT
-        f.send_event_id, f.take_event_id,
-        coalesce(s.request_id, c.request_id) AS request_id
+    SELECT f.send_event_id, f.take_event_id, coalesce(s.request_id, c.request_id) AS request_id
     FROM found AS f
     LEFT JOIN staging.response_request AS sr ON f.send_event_id = sr.event_id
     LEFT JOIN staging.request_origin AS s ON sr.request_event_id = s.take_event_id
@@ -41,20 +38,11 @@ answered AS (
     LEFT JOIN by_client AS c ON cr.request_event_id = c.send_event_id
 )
 SELECT
-    row_number() OVER (
-        ORDER BY coalesce(a.send_event_id, a.take_event_id)
-    ) AS response_id,
-    client.client_id,
-    service.service_id,
-    a.request_id,
+    row_number() OVER (ORDER BY coalesce(a.send_event_id, a.take_event_id)) AS response_id,
+    client.client_id, service.service_id, a.request_id,
     coalesce(s.sequence_number, c.sequence_number) AS sequence_number,
-    s.ts_ns AS sent_ns,
-    c.ts_ns AS taken_ns,
-    s.thread_id AS sender_thread_id,
-    c.thread_id AS receiver_thread_id,
-    i.callback_instance_id,
-    a.send_event_id,
-    a.take_event_id
+    s.ts_ns AS sent_ns, c.ts_ns AS taken_ns, s.thread_id AS sender_thread_id,
+    c.thread_id AS receiver_thread_id, i.callback_instance_id, a.send_event_id, a.take_event_id
 FROM answered AS a
 LEFT JOIN staging.service_event AS s ON a.send_event_id = s.event_id
 LEFT JOIN staging.client_event AS c ON a.take_event_id = c.event_id

@@ -1,4 +1,3 @@
--- name: staging.response_pair
 -- description: Responses as they were sent and taken: by the client's GID, its number of the
 --     request, and the stamp; without a stamp on one of the sides, where only one comes into
 --     question. Of equal ones the k-th sent is the k-th taken.

@@ -1,4 +1,3 @@
--- name: staging.response_request
 -- description: Which request each end of a response answers: at the service the request of the
 --     same client and number that it took last before, at the client the one that it sent.
 -- grain: one row per end of a response whose request was traced at the same end

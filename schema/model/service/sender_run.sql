@@ -1,4 +1,3 @@
--- name: staging.sender_run
 -- description: Callback instances that requests and responses were sent in: the innermost on the
 --     thread that had begun and was not over. Of a step of Python it is the first one of the call.
 -- grain: one row per request or response sent inside a callback instance
@@ -18,9 +17,7 @@ run AS (
     LEFT JOIN staging.callback_nesting AS p ON r.start_event_id = p.start_event_id
     LEFT JOIN staging.callback_number AS o ON p.parent_event_id = o.start_event_id
 ),
-nesting AS (
-    SELECT DISTINCT thread_id FROM run WHERE parent_id IS NOT NULL
-),
+nesting AS (SELECT DISTINCT thread_id FROM run WHERE parent_id IS NOT NULL),
 -- Whose instance goes on after each event; where one ends at the begin of another, the other.
 edge AS (
     SELECT run.thread_id, start_event_id AS event_id, callback_instance_id, 0 AS rank

@@ -1,4 +1,3 @@
--- name: staging.service
 -- description: Services. One that was used but never initialised in the trace has no node.
 -- grain: one row per service
 -- when: staging.service_known, staging.service_inferred
@@ -11,11 +10,7 @@ WITH every_service AS (
 )
 SELECT
     row_number() OVER (ORDER BY s.event_id) AS service_id,
-    s.process_id,
-    n.node_id,
-    s.service_name,
-    s.service_handle,
-    s.rmw_handle,
+    s.process_id, n.node_id, s.service_name, s.service_handle, s.rmw_handle,
     NULL::BLOB AS gid,
     s.created_ns,
     staging.is_internal_service(s.service_name) AS is_internal,

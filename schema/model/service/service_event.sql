@@ -1,4 +1,3 @@
--- name: staging.service_event
 -- description: Requests that services took and responses that they sent, each with its service and
 --     the GID of the client.
 -- grain: one row per successful rmw_take_request or rmw_send_response
@@ -17,13 +16,9 @@ WITH event AS NOT MATERIALIZED (
 ),
 -- There are few clients, and many events of each.
 requester AS (
-    SELECT client_gid, staging.gid_bytes(client_gid) AS gid
-    FROM event
-    GROUP BY client_gid
+    SELECT client_gid, staging.gid_bytes(client_gid) AS gid FROM event GROUP BY client_gid
 ),
-service AS (
-    SELECT event_id, process_id, rmw_handle AS handle FROM staging.service_known
-)
+service AS (SELECT event_id, process_id, rmw_handle AS handle FROM staging.service_known)
 SELECT
     e.event_id, e.ts_ns, e.thread_id, e.process_id, e.is_request, e.handle AS rmw_handle, g.gid,
     e.sequence_number, e.source_timestamp_ns, e.object_event_id AS service_event_id, e.is_inferred

@@ -1,4 +1,3 @@
--- name: staging.service_inferred
 -- description: Services that were used but never initialised in the trace, with the name that
 --     their clients call them by.
 -- grain: one row per such service

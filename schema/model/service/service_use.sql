@@ -1,4 +1,3 @@
--- name: staging.service_use
 -- description: Which clients called which services, as requests and responses show.
 -- grain: one row per client and service
 -- when: staging.client_event

@@ -1,4 +1,3 @@
--- name: derive.action_endpoint
 -- description: Services, clients, publishers and subscriptions of actions, by what their names say:
 --     those of the action /dock are called /dock/_action/send_goal, and so on.
 -- grain: one row per such object

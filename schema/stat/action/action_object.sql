@@ -1,5 +1,3 @@
--- name: derive.action_object
--- kind: macro
 -- description: Action servers or clients, put together from their objects. rcl creates these one
 --     right after the other, the one of send_goal first: the others are the first of their names
 --     that the process created at that time or later.
@@ -10,12 +8,9 @@
 --     'subscription' of clients
 CREATE OR REPLACE MACRO derive.action_object(endpoints, of_calls, of_topics) AS TABLE
 SELECT
-    g.run_id, g.process_id, g.node_id, g.action_name, g.created_ns,
-    g.object_id AS goal_object_id,
-    c.object_id AS cancel_object_id,
-    r.object_id AS result_object_id,
-    f.object_id AS feedback_object_id,
-    s.object_id AS status_object_id
+    g.run_id, g.process_id, g.node_id, g.action_name, g.created_ns, g.object_id AS goal_object_id,
+    c.object_id AS cancel_object_id, r.object_id AS result_object_id,
+    f.object_id AS feedback_object_id, s.object_id AS status_object_id
 FROM query_table(endpoints) AS g
 ASOF LEFT JOIN (FROM query_table(endpoints) WHERE kind = of_calls AND part = 'cancel_goal') AS c
     ON g.process_id = c.process_id AND g.action_name = c.action_name

@@ -1,4 +1,3 @@
--- name: derive.call_traced
 -- description: Processes whose requests and responses have events in a trace of their host. Where
 --     none was seen, there was none.
 -- grain: one row per such process

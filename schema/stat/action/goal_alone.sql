@@ -1,5 +1,3 @@
--- name: derive.goal_alone
--- kind: macro
 -- description: When an action server was concerned with one goal and no other: then what it
 --     publishes is of that goal. Goals whose results cannot be told apart have no such times.
 -- grain: one row per server and moment at which that changes
@@ -13,9 +11,7 @@ WITH change AS (
 ),
 -- Of one open goal, the sum is its identity.
 summed AS (
-    SELECT
-        action_server_id, at_ns,
-        sum(change) AS change, sum(change * goal_id) AS goal_change
+    SELECT action_server_id, at_ns, sum(change) AS change, sum(change * goal_id) AS goal_change
     FROM change
     GROUP BY action_server_id, at_ns
 ),
@@ -28,5 +24,4 @@ open AS (
 )
 SELECT o.action_server_id, o.at_ns, s.goal_id
 FROM open AS o
-LEFT JOIN query_table(spans) AS s
-    ON o.open = 1 AND o.goal_id = s.goal_id AND s.is_end_certain
+LEFT JOIN query_table(spans) AS s ON o.open = 1 AND o.goal_id = s.goal_id AND s.is_end_certain

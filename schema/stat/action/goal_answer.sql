@@ -1,5 +1,3 @@
--- name: derive.goal_answer
--- kind: macro
 -- description: What an action server said to a goal, as far as its thread shows. Once it has
 --     accepted one, the next thing that the same thread does is to publish the status of its goals:
 --     rclcpp and rclpy do nothing in between. If the thread goes on with anything else, the goal
@@ -53,8 +51,7 @@ followed AS (
     FROM answer AS a
     ASOF LEFT JOIN (FROM deed WHERE thread_id IN (SELECT thread_id FROM answer)) AS d
         ON a.thread_id = d.thread_id AND a.sent_ns < d.at_ns
-    ASOF LEFT JOIN store.thread_break AS b
-        ON a.thread_id = b.thread_id AND d.at_ns >= b.resumed_ns
+    ASOF LEFT JOIN store.thread_break AS b ON a.thread_id = b.thread_id AND d.at_ns >= b.resumed_ns
 )
 SELECT
     response_id,

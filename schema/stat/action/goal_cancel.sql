@@ -1,5 +1,3 @@
--- name: derive.goal_cancel
--- kind: macro
 -- description: Requests to cancel goals that were accepted: between the take of such a request and
 --     its response, the server publishes the status of its goals if it cancels one. Which goal that
 --     is is known if there is only one.
@@ -26,8 +24,7 @@ published AS (
         ON a.status_publisher_id = b.publisher_id AND a.sender_thread_id = b.thread_id
         AND b.start_ns BETWEEN a.taken_ns AND a.answered_ns
     ANTI JOIN store.response AS r
-        ON a.sender_thread_id = r.sender_thread_id
-        AND r.sent_ns BETWEEN a.taken_ns AND b.start_ns
+        ON a.sender_thread_id = r.sender_thread_id AND r.sent_ns BETWEEN a.taken_ns AND b.start_ns
     GROUP BY a.request_id
 )
 SELECT a.run_id, a.request_id, a.action_server_id, p.publication_id, g.goal_id

@@ -1,5 +1,3 @@
--- name: derive.goal_feedback
--- kind: macro
 -- description: Feedback of action servers, and which goal it is of: that is not in the trace, so it
 --     is known only while the server is concerned with one goal and no other.
 -- grain: one row per feedback message that an action server published

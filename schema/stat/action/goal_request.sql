@@ -1,5 +1,3 @@
--- name: derive.goal_request
--- kind: macro
 -- description: Goals that were sent to an action server, and what it answered.
 -- grain: one row per goal and action server that took it; one per goal that none took
 -- param: servers VARCHAR  Name of the rows of action servers, see main.goal
@@ -15,16 +13,9 @@ WITH answer AS (
     GROUP BY r.request_id
 )
 SELECT
-    q.run_id,
-    q.request_id AS goal_id,
-    q.client_id AS action_client_id,
-    q.service_id AS action_server_id,
-    q.sent_ns,
-    q.taken_ns,
-    a.sent_ns AS answered_ns,
-    a.taken_ns AS answer_taken_ns,
-    a.is_accepted,
-    a.status_ns,
+    q.run_id, q.request_id AS goal_id, q.client_id AS action_client_id,
+    q.service_id AS action_server_id, q.sent_ns, q.taken_ns, a.sent_ns AS answered_ns,
+    a.taken_ns AS answer_taken_ns, a.is_accepted, a.status_ns,
     coalesce(c.action_name, s.action_name) AS action_name
 FROM store.request AS q
 LEFT JOIN query_table(clients) AS c ON q.client_id = c.action_client_id

@@ -1,5 +1,3 @@
--- name: derive.goal_result
--- kind: macro
 -- description: Which goal a request for a result belongs to. The number of the goal is not in the
 --     trace. A request that a thread sent after it took the answer to a goal, in the same turn, is
 --     for that goal (derive.certain_call). Else what counts is which goals of the client are open:
@@ -100,12 +98,10 @@ placed AS (
         count(request_id) OVER (PARTITION BY party, block) AS requests
     FROM parted
 )
-SELECT goal_id, request_id, 1 AS candidate_count
-FROM followed
+SELECT goal_id, request_id, 1 AS candidate_count FROM followed
 UNION ALL
 SELECT
-    g.goal_id,
-    r.request_id,
+    g.goal_id, r.request_id,
     CASE WHEN coalesce(g.requests, r.requests) = 0 THEN 0 ELSE coalesce(g.goals, r.goals) END
 FROM (FROM placed WHERE goal_id IS NOT NULL) AS g
 FULL JOIN (FROM placed WHERE request_id IS NOT NULL) AS r

@@ -1,5 +1,3 @@
--- name: derive.goal_span
--- kind: macro
 -- description: From when to when an action server was concerned with a goal that it accepted, or
 --     may have: from its answer until it sent the result; without an end if nobody asked for that.
 --     Clients that ask late get it late. Of goals whose results cannot be told apart, the ends are
@@ -26,9 +24,7 @@ WITH unseen AS (
 ),
 span AS (
     SELECT
-        g.run_id,
-        g.goal_id,
-        g.action_server_id,
+        g.run_id, g.goal_id, g.action_server_id,
         coalesce(g.answered_ns, g.taken_ns) AS start_ns,
         min(r.sent_ns) AS end_ns,
         coalesce(any_value(p.candidate_count), 0) <= 1 AS is_end_certain
@@ -59,7 +55,6 @@ placed AS (
         )
 )
 SELECT
-    *,
-    is_begun_during_other
+    *, is_begun_during_other
     OR (next_start_ns IS NOT NULL AND coalesce(next_start_ns < end_ns, true)) AS is_overlapping
 FROM placed

@@ -1,5 +1,3 @@
--- name: derive.block_length
--- kind: macro
 -- description: How many values that follow each other have to be resampled together, how many in a
 --     row are alike, and by how much intervals have to be wider since blocks are few. `parts` is
 --     the name of a table with a row per value: side, subject, how many values these have, the
@@ -9,8 +7,7 @@
 CREATE OR REPLACE MACRO derive.block_length(parts) AS TABLE
 WITH variance AS (
     SELECT
-        side,
-        subject,
+        side, subject,
         avg(median_part) AS median_mean,
         avg(mean_part) AS mean_mean,
         avg(p95_part) AS p95_mean,
@@ -25,8 +22,7 @@ WITH variance AS (
 -- Blocks of 2, 4, 8, … neighbours, each overlapping the next one by half; five of them at least.
 half AS (
     SELECT
-        c.side,
-        c.subject,
+        c.side, c.subject,
         1 << n.level AS half_length,
         c.position >> n.level AS place,
         any_value(c.number) AS number,
@@ -41,9 +37,7 @@ half AS (
 ),
 whole AS (
     SELECT
-        side,
-        subject,
-        number,
+        side, subject, number,
         2 * half_length AS block_length,
         median_sum + lead(median_sum) OVER following AS median_sum,
         mean_sum + lead(mean_sum) OVER following AS mean_sum,
@@ -56,10 +50,7 @@ whole AS (
 -- more the means of blocks vary than those of as many independent values.
 alike AS (
     SELECT
-        w.side,
-        w.subject,
-        w.number,
-        w.block_length,
+        w.side, w.subject, w.number, w.block_length,
         list_transform(
             [
                 avg(pow(w.median_sum - w.block_length * v.median_mean, 2) / v.median_variance),
@@ -67,9 +58,7 @@ alike AS (
                 avg(pow(w.p95_sum - w.block_length * v.p95_mean, 2) / v.p95_variance),
                 avg(pow(w.p99_sum - w.block_length * v.p99_mean, 2) / v.p99_variance)
             ],
-            lambda each: coalesce(
-                each / w.block_length * w.number / (w.number - w.block_length), 1
-            )
+            lambda each: coalesce(each / w.block_length * w.number / (w.number - w.block_length), 1)
         ) AS times
     FROM whole AS w
     JOIN variance AS v ON w.side = v.side AND w.subject = v.subject
@@ -77,11 +66,7 @@ alike AS (
 ),
 grown AS (
     SELECT
-        side,
-        subject,
-        number,
-        block_length,
-        times,
+        side, subject, number, block_length, times,
         lead(times) OVER longer AS twice_times,
         max(list_max(times)) OVER longer AS longest
     FROM alike
@@ -91,9 +76,7 @@ grown AS (
 -- still miss what reaches beyond their ends: it halves with twice the length, and is added. How
 -- much so few blocks vary is not known well: intervals are wider by as much as Student's t is.
 SELECT
-    side,
-    subject,
-    block_length,
+    side, subject, block_length,
     list_transform(
         list_zip(times, twice_times),
         lambda each: sqrt(

@@ -1,5 +1,3 @@
--- name: derive.bootstrap_interval
--- kind: macro
 -- description: Ends of the confidence interval of side b less side a, as deviations from the
 --     difference that was measured, by a circular block bootstrap. `measures` is the name of a
 --     table with number, quantiles, mean and values in order of each side and subject, `blocks_of`
@@ -13,12 +11,7 @@ CREATE OR REPLACE MACRO derive.bootstrap_interval(
 -- a block longer than 128 values, every other one (third, …) is taken.
 WITH ring AS (
     SELECT
-        m.side,
-        m.subject,
-        m.number,
-        m.quantiles,
-        m.mean_ns,
-        k.block_length,
+        m.side, m.subject, m.number, m.quantiles, m.mean_ns, k.block_length,
         greatest(10, ceil(least(m.number, 1000) / k.block_length))::BIGINT AS blocks,
         ceil(k.block_length / 128)::BIGINT AS step,
         list_concat(m.series, m.series[:k.block_length - 1]) AS series,
@@ -30,11 +23,7 @@ WITH ring AS (
 ),
 drawn AS (
     SELECT
-        r.side,
-        r.subject,
-        r.quantiles,
-        r.mean_ns,
-        r.widenings,
+        r.side, r.subject, r.quantiles, r.mean_ns, r.widenings,
         sqrt(r.blocks * r.block_length / r.number) AS narrowing,
         n.resample,
         list_sort(flatten(list_transform(
@@ -49,11 +38,7 @@ drawn AS (
 ),
 resampled AS (
     SELECT
-        side,
-        subject,
-        resample,
-        narrowing,
-        widenings,
+        side, subject, resample, narrowing, widenings,
         [
             sorted[ceil(0.5 * len(sorted))::BIGINT] - quantiles[1],
             list_avg(sorted) - mean_ns,
@@ -64,9 +49,7 @@ resampled AS (
 ),
 deviation AS (
     SELECT
-        side,
-        subject,
-        resample,
+        side, subject, resample,
         unnest(['median', 'mean', 'p95', 'p99']) AS statistic,
         unnest(list_transform(
             list_zip(deviations, widenings), lambda each: each[1] * each[2] * narrowing
@@ -74,8 +57,7 @@ deviation AS (
     FROM resampled
 )
 SELECT
-    a.subject,
-    a.statistic,
+    a.subject, a.statistic,
     quantile_cont(
         b.deviation_ns - a.deviation_ns, [(1 - confidence) / 2, (1 + confidence) / 2]
     ) AS ends

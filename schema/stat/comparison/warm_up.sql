@@ -1,5 +1,3 @@
--- name: derive.warm_up
--- kind: macro
 -- description: Systems that warm up: their longest values lie at the start. `parts` is the name of
 --     a table with a row per value: side, subject, how many values these have, the place of the
 --     value among them, when it was, and the value.

@@ -1,4 +1,3 @@
--- name: derive.callback_exclusion
 -- description: Which callbacks of executors of several threads never run at the same time: those
 --     of a mutually exclusive callback group, where the trace tells of groups. Elsewhere a
 --     callback is assumed to exclude only itself, unless it was seen to run beside itself.
@@ -11,8 +10,7 @@ WITH run AS (
 ),
 beside AS (
     SELECT
-        run_id,
-        callback_id,
+        run_id, callback_id,
         start_ns < max(end_ns) OVER (
             PARTITION BY run_id, callback_id ORDER BY start_ns, callback_instance_id
             ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
@@ -20,8 +18,7 @@ beside AS (
     FROM run
 )
 SELECT
-    b.run_id,
-    b.callback_id,
+    b.run_id, b.callback_id,
     CASE WHEN g.callback_group_id IS NULL THEN 'callback' ELSE 'callback_group' END AS kind,
     coalesce(g.callback_group_id, b.callback_id) AS exclusion_id
 FROM beside AS b

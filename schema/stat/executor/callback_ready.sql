@@ -1,5 +1,3 @@
--- name: derive.callback_ready
--- kind: macro
 -- description: Between which moments the input of a callback became ready in its executor. Not
 --     before its release, nor before the subscription was made. In an executor of one thread also
 --     not before it last went to sleep, nor before the last polling point but one, which would have
@@ -58,8 +56,7 @@ polled AS (
         p.run_id, p.executor_id, p.thread_id, p.callback_id, p.callback_instance_id, p.start_ns,
         p.previous_start_ns, p.since, p.origin_ns, p.subscribed_ns, p.latest_ns, p.thread_count,
         p.picked_ns, w.end_ns AS polled_ns, w.previous_end_ns, w.asleep_ns,
-        w.start_ns AS wait_start_ns,
-        w.before_ns AS wait_before_ns
+        w.start_ns AS wait_start_ns, w.before_ns AS wait_before_ns
     FROM picked AS p
     ASOF LEFT JOIN derive.executor_poll('sized') AS w
         ON p.executor_id = w.executor_id AND p.picked_ns >= w.end_ns
@@ -113,24 +110,14 @@ bounded AS (
     FROM confined
 )
 SELECT
-    run_id,
-    executor_id,
-    thread_id,
-    callback_id,
-    callback_instance_id,
-    since,
-    origin_ns,
+    run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
     earliest_ns,
     -- Published after the polling point: the queue was full, and this message took the place of an
     -- older one.
     greatest(CASE WHEN polled_ns < earliest_ns THEN latest_ns ELSE polled_ns END, earliest_ns)
         AS latest_ns,
-    start_ns,
-    thread_count,
+    start_ns, thread_count,
     coalesce(picked_ns, start_ns) AS picked_ns,
-    wait_start_ns,
-    wait_end_ns,
-    wait_before_ns,
-    previous_end_ns AS previous_wait_end_ns,
+    wait_start_ns, wait_end_ns, wait_before_ns, previous_end_ns AS previous_wait_end_ns,
     coalesce(resumed_ns > coalesce(earliest_ns, polled_ns), false) AS is_loss_affected
 FROM bounded

@@ -1,5 +1,3 @@
--- name: derive.callback_release
--- kind: macro
 -- description: Since when a callback instance can have been due (its release), and by when it was
 --     due for certain. A message can have been due since the end of its publication, or since its
 --     stamp where the two clocks cannot be compared; a request since it was sent. A timer is due
@@ -31,17 +29,14 @@ started AS (
     JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
     JOIN store.callback AS c ON i.callback_id = c.callback_id
     LEFT JOIN derive.timer_due(executors) AS d ON i.callback_instance_id = d.callback_instance_id
-    WHERE i.depth = 1
-        AND x.executor_id IN (SELECT executor_id FROM query_table(executors))
+    WHERE i.depth = 1 AND x.executor_id IN (SELECT executor_id FROM query_table(executors))
 ),
 -- Used by messages and requests, at both ends.
 clock AS MATERIALIZED (FROM derive.process_clock),
 pair AS MATERIALIZED (FROM derive.clock_comparable),
 message AS (
     SELECT
-        t.take_id,
-        t.taken_ns,
-        s.created_ns,
+        t.take_id, t.taken_ns, s.created_ns,
         CASE
             WHEN l.publication_id IS NULL AND t.source_timestamp_ns <= t.taken_ns
                 THEN t.source_timestamp_ns
@@ -60,8 +55,7 @@ message AS (
     LEFT JOIN store.publication AS b ON l.publication_id = b.publication_id
     LEFT JOIN store.data_arrival AS d ON t.take_id = d.take_id
     LEFT JOIN clock AS bc ON b.process_id = bc.process_id
-    LEFT JOIN pair AS p
-        ON b.process_id = p.process_id AND t.process_id = p.other_process_id
+    LEFT JOIN pair AS p ON b.process_id = p.process_id AND t.process_id = p.other_process_id
 ),
 request AS (
     SELECT
@@ -81,12 +75,7 @@ request AS (
     JOIN clock AS rc ON receiver.process_id = rc.process_id
 )
 SELECT
-    i.run_id,
-    i.executor_id,
-    i.thread_id,
-    i.callback_id,
-    i.callback_instance_id,
-    i.start_ns,
+    i.run_id, i.executor_id, i.thread_id, i.callback_id, i.callback_instance_id, i.start_ns,
     i.previous_start_ns,
     CASE
         WHEN i.due_ns IS NOT NULL THEN 'timer'

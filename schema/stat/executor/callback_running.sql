@@ -1,14 +1,9 @@
--- name: derive.callback_running
 -- description: Stretches of time in which at least one thread of an executor with several threads
 --     ran a callback. `before_ns` is the sum of the earlier stretches of the callback.
 -- grain: one row per such stretch
 WITH run AS (
     SELECT
-        r.run_id,
-        r.executor_id,
-        r.callback_id,
-        r.start_ns,
-        r.end_ns,
+        r.run_id, r.executor_id, r.callback_id, r.start_ns, r.end_ns,
         coalesce(r.start_ns > max(r.end_ns) OVER (
             in_time ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
         ), true) AS is_first
@@ -29,17 +24,12 @@ numbered AS (
     FROM run
 ),
 stretch AS (
-    SELECT
-        run_id, executor_id, callback_id, min(start_ns) AS start_ns, max(end_ns) AS end_ns
+    SELECT run_id, executor_id, callback_id, min(start_ns) AS start_ns, max(end_ns) AS end_ns
     FROM numbered
     GROUP BY run_id, executor_id, callback_id, stretch
 )
 SELECT
-    run_id,
-    executor_id,
-    callback_id,
-    start_ns,
-    end_ns,
+    run_id, executor_id, callback_id, start_ns, end_ns,
     coalesce(sum(end_ns - start_ns) OVER (
         PARTITION BY run_id, executor_id, callback_id ORDER BY start_ns
         ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING

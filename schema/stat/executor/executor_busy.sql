@@ -1,4 +1,3 @@
--- name: derive.executor_busy
 -- description: Stretches of time in which no thread of an executor was free to start a callback:
 --     each of them ran one. With the sum of all such time before. Of an executor of one
 --     thread each is one callback instance.
@@ -9,11 +8,7 @@ SELECT
 FROM derive.executor_full
 UNION ALL
 SELECT
-    r.run_id,
-    r.executor_id,
-    r.start_ns,
-    r.end_ns,
-    r.callback_instance_id,
+    r.run_id, r.executor_id, r.start_ns, r.end_ns, r.callback_instance_id,
     lag(r.end_ns) OVER in_time,
     coalesce(sum(r.end_ns - r.start_ns) OVER (
         in_time ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING

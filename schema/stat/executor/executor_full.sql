@@ -1,4 +1,3 @@
--- name: derive.executor_full
 -- description: Stretches of time in which all threads of an executor with several threads ran
 --     callbacks. `before_ns` is the sum of the earlier stretches.
 -- grain: one row per such stretch
@@ -15,19 +14,14 @@ WITH edge AS (
 ),
 level AS (
     SELECT
-        run_id,
-        executor_id,
-        at_ns AS start_ns,
+        run_id, executor_id, at_ns AS start_ns,
         lead(at_ns) OVER in_time AS end_ns,
         sum(step) OVER (in_time ROWS UNBOUNDED PRECEDING) AS running
     FROM edge
     WINDOW in_time AS (PARTITION BY run_id, executor_id ORDER BY at_ns, step)
 )
 SELECT
-    l.run_id,
-    l.executor_id,
-    l.start_ns,
-    l.end_ns,
+    l.run_id, l.executor_id, l.start_ns, l.end_ns,
     coalesce(sum(l.end_ns - l.start_ns) OVER (
         PARTITION BY l.run_id, l.executor_id ORDER BY l.start_ns
         ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING

@@ -1,5 +1,3 @@
--- name: derive.executor_meanwhile
--- kind: macro
 -- description: What the threads of its executor ran while a callback instance waited. The messages
 --     of a burst wait for each other: the pairs of all instances are many, those of one instance
 --     are few.
@@ -8,13 +6,9 @@
 CREATE OR REPLACE MACRO derive.executor_meanwhile(waits) AS TABLE
 WITH waiting AS (
     SELECT
-        r.run_id,
-        r.executor_id,
-        r.callback_instance_id,
+        r.run_id, r.executor_id, r.callback_instance_id,
         coalesce(r.earliest_ns, r.latest_ns) AS from_ns,
-        r.latest_ns,
-        r.start_ns,
-        x.thread_id
+        r.latest_ns, r.start_ns, x.thread_id
     FROM query_table(waits) AS r
     JOIN store.executor_thread AS x ON r.executor_id = x.executor_id
     WHERE r.start_ns > coalesce(r.earliest_ns, r.latest_ns)
@@ -52,12 +46,8 @@ pair AS (
     WHERE first_position <= last_position
 )
 SELECT
-    p.run_id,
-    p.callback_instance_id,
-    r.callback_instance_id AS meanwhile_id,
-    r.callback_id AS meanwhile_callback_id,
-    p.executor_id,
-    p.thread_id,
+    p.run_id, p.callback_instance_id, r.callback_instance_id AS meanwhile_id,
+    r.callback_id AS meanwhile_callback_id, p.executor_id, p.thread_id,
     least(r.end_ns, p.start_ns) - greatest(r.start_ns, p.from_ns) AS overlap_ns,
     greatest(least(r.end_ns, p.start_ns) - greatest(r.start_ns, p.latest_ns), 0) AS certain_ns
 FROM pair AS p

@@ -1,5 +1,3 @@
--- name: derive.executor_poll
--- kind: macro
 -- description: The moments at which executors learned what is ready: the ends of their waits
 --     (polling points). What is not found there waits for the next one. `before_ns` is the sum of
 --     all time spent waiting before. A wait of less than a millisecond may have found something
@@ -57,10 +55,7 @@ own AS (
     WHERE r.end_ns IS NULL OR r.end_ns <= w.start_ns
 )
 SELECT
-    run_id,
-    executor_id,
-    start_ns,
-    end_ns,
+    run_id, executor_id, start_ns, end_ns,
     lag(end_ns) OVER in_time AS previous_end_ns,
     max(CASE WHEN end_ns - start_ns >= 1000000 THEN start_ns END) OVER (
         in_time ROWS UNBOUNDED PRECEDING

@@ -1,13 +1,10 @@
--- name: derive.executor_queue
--- kind: macro
 -- description: For how long the thread of a callback instance waited for a CPU before it, outside
 --     of other callbacks, and what had the CPU meanwhile: as a kernel trace shows it.
 -- grain: one row per waiting callback instance whose thread the kernel traced
 -- param: waits VARCHAR  Name of rows as of derive.callback_ready
 CREATE OR REPLACE MACRO derive.executor_queue(waits) AS TABLE
 WITH waiting AS MATERIALIZED (
-    SELECT
-        callback_instance_id, thread_id, coalesce(earliest_ns, latest_ns) AS from_ns, start_ns
+    SELECT callback_instance_id, thread_id, coalesce(earliest_ns, latest_ns) AS from_ns, start_ns
     FROM query_table(waits)
     WHERE coalesce(earliest_ns, latest_ns) IS NOT NULL
         AND thread_id IN (SELECT thread_id FROM store.thread_state)
@@ -19,8 +16,7 @@ stretch AS (
     FROM store.thread_state
     WHERE state IN ('preempted', 'runnable')
     UNION ALL
-    SELECT
-        true, thread_id, start_ns, end_ns, state, preemptor_thread_id, preemptor_other_thread_id
+    SELECT true, thread_id, start_ns, end_ns, state, preemptor_thread_id, preemptor_other_thread_id
     FROM store.preemptor
 ),
 -- What begins and ends a callback needs a CPU: such a wait lies inside of a callback, or outside.
@@ -33,8 +29,7 @@ outside AS MATERIALIZED (
         SELECT thread_id, start_ns, end_ns FROM store.callback_instance WHERE parent_id IS NULL
     ) AS i
         ON s.thread_id = i.thread_id AND s.start_ns >= i.start_ns
-    WHERE s.thread_id IN (SELECT thread_id FROM waiting)
-        AND coalesce(i.end_ns <= s.start_ns, true)
+    WHERE s.thread_id IN (SELECT thread_id FROM waiting) AND coalesce(i.end_ns <= s.start_ns, true)
 ),
 -- These follow each other on a thread, so those that overlap a wait are neighbours.
 reached AS (
@@ -97,8 +92,7 @@ SELECT
     w.callback_instance_id,
     coalesce(q.run_queue_ns, 0)::BIGINT AS run_queue_ns,
     coalesce(q.preempted_ns, 0)::BIGINT AS preempted_ns,
-    t.cpu_taken_by,
-    t.cpu_taken_ns
+    t.cpu_taken_by, t.cpu_taken_ns
 FROM waiting AS w
 LEFT JOIN queued AS q ON w.callback_instance_id = q.callback_instance_id
 LEFT JOIN taken AS t ON w.callback_instance_id = t.callback_instance_id

@@ -1,19 +1,12 @@
--- name: derive.executor_run
 -- description: The callback instances that occupied threads of executors, numbered on each thread
 --     in order of time. Callback instances nested in others are part of those. So the rows of one
 --     thread never overlap, and the sum over any stretch of time takes only two look-ups. Times are
 --     those of the executor's clock.
 -- grain: one row per callback instance that is not nested in another
 SELECT
-    i.run_id,
-    x.executor_id,
-    i.thread_id,
-    i.callback_id,
-    i.callback_instance_id,
-    i.start_ns,
+    i.run_id, x.executor_id, i.thread_id, i.callback_id, i.callback_instance_id, i.start_ns,
     coalesce(i.end_ns, i.start_ns) AS end_ns,
-    i.take_id,
-    i.request_id,
+    i.take_id, i.request_id,
     row_number() OVER (
         PARTITION BY i.run_id, i.thread_id ORDER BY i.start_ns, i.callback_instance_id
     ) AS position

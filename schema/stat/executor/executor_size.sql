@@ -1,4 +1,3 @@
--- name: derive.executor_size
 -- description: How many threads an executor was seen to have.
 -- grain: one row per executor
 SELECT run_id, executor_id, count(*) AS thread_count

@@ -1,5 +1,3 @@
--- name: derive.executor_waits
--- kind: macro
 -- description: How long callback instances waited in their executor, and what for: see
 --     main.executor_wait.
 -- grain: one row per waiting callback instance
@@ -17,8 +15,7 @@ ready AS MATERIALIZED (
         r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.since,
         r.origin_ns, r.earliest_ns, r.latest_ns, r.start_ns, r.thread_count, r.picked_ns,
         r.wait_start_ns, r.wait_end_ns, r.wait_before_ns, r.previous_wait_end_ns,
-        r.is_loss_affected,
-        b.before_ns AS start_busy_ns,
+        r.is_loss_affected, b.before_ns AS start_busy_ns,
         CASE WHEN r.earliest_ns >= coalesce(b.previous_end_ns, r.earliest_ns) THEN b.before_ns END
             AS earliest_busy_ns,
         CASE WHEN r.latest_ns >= coalesce(b.previous_end_ns, r.latest_ns) THEN b.before_ns END
@@ -47,10 +44,7 @@ moment AS MATERIALIZED (
 ),
 busy AS MATERIALIZED (
     SELECT
-        m.callback_instance_id,
-        m.callback_id,
-        m.which,
-        m.at_ns,
+        m.callback_instance_id, m.callback_id, m.which, m.at_ns,
         coalesce(b.before_ns + least(m.at_ns, b.end_ns) - b.start_ns, 0) AS until_ns
     FROM moment AS m
     ASOF LEFT JOIN (
@@ -86,16 +80,13 @@ blocking AS (
             coalesce(s.before_ns + least(r.start_ns, s.end_ns) - s.start_ns, 0) AS start_busy_ns,
             coalesce(e.before_ns + least(r.end_ns, e.end_ns) - e.start_ns, 0) AS end_busy_ns
         FROM excluding AS r
-        ASOF LEFT JOIN stretch AS s
-            ON r.executor_id = s.executor_id AND r.start_ns >= s.start_ns
-        ASOF LEFT JOIN stretch AS e
-            ON r.executor_id = e.executor_id AND r.end_ns >= e.start_ns
+        ASOF LEFT JOIN stretch AS s ON r.executor_id = s.executor_id AND r.start_ns >= s.start_ns
+        ASOF LEFT JOIN stretch AS e ON r.executor_id = e.executor_id AND r.end_ns >= e.start_ns
     )
 ),
 blocked AS (
     SELECT
-        m.callback_instance_id,
-        m.which,
+        m.callback_instance_id, m.which,
         CASE
             WHEN b.end_ns IS NULL THEN 0
             WHEN m.at_ns >= b.end_ns THEN b.before_ns + b.blocked_ns
@@ -115,10 +106,7 @@ drowsy AS MATERIALIZED (
     SELECT callback_instance_id, executor_id, 'earliest' AS which, earliest_ns AS at_ns
     FROM ready
     WHERE earliest_ns IS NOT NULL
-        AND (
-            thread_count > 1
-            OR earliest_ns < wait_start_ns AND earliest_ns < previous_wait_end_ns
-        )
+        AND (thread_count > 1 OR earliest_ns < wait_start_ns AND earliest_ns < previous_wait_end_ns)
     UNION ALL
     -- What a thread has picked does not wait for work that others wait for.
     SELECT callback_instance_id, executor_id, 'picked', greatest(picked_ns, earliest_ns)
@@ -126,9 +114,7 @@ drowsy AS MATERIALIZED (
     WHERE thread_count > 1
 ),
 -- Whether an executor waits at all is looked up where none of its callbacks shows it.
-silent AS (
-    SELECT executor_id FROM ready GROUP BY executor_id HAVING max(wait_start_ns) IS NULL
-),
+silent AS (SELECT executor_id FROM ready GROUP BY executor_id HAVING max(wait_start_ns) IS NULL),
 looked_up AS (
     SELECT executor_id, max(at_ns) AS until_ns FROM drowsy GROUP BY executor_id
     UNION ALL
@@ -139,8 +125,7 @@ poll AS MATERIALIZED (
 ),
 idle AS (
     SELECT
-        m.callback_instance_id,
-        m.which,
+        m.callback_instance_id, m.which,
         coalesce(w.before_ns + least(m.at_ns, w.end_ns) - w.start_ns, 0) AS until_ns
     FROM drowsy AS m
     ASOF LEFT JOIN poll AS w ON m.executor_id = w.executor_id AND m.at_ns >= w.start_ns
@@ -197,12 +182,7 @@ measured AS (
     LEFT JOIN waiting AS w ON r.executor_id = w.executor_id
 )
 SELECT
-    r.run_id,
-    r.callback_instance_id,
-    r.executor_id,
-    r.thread_id,
-    r.callback_id,
-    r.since,
+    r.run_id, r.callback_instance_id, r.executor_id, r.thread_id, r.callback_id, r.since,
     derive.corrected_ns(r.origin_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS origin_ns,
     derive.corrected_ns(r.earliest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS earliest_ns,
     derive.corrected_ns(r.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latest_ns,
@@ -211,8 +191,7 @@ SELECT
     r.busy_start_ns - r.busy_latest_ns + r.blocked_min_ns AS busy_min_ns,
     r.busy_start_ns - r.busy_earliest_ns + r.blocked_max_ns AS busy_max_ns,
     CASE WHEN r.earliest_ns IS NOT NULL THEN r.blocked_max_ns END AS blocked_max_ns,
-    r.idle_ns,
-    r.is_loss_affected,
+    r.idle_ns, r.is_loss_affected,
     -- An excluded callback may wait while a thread is idle: then more was held than this says.
     CASE WHEN r.thread_count > 1 AND r.idle_ns IS NOT NULL THEN greatest(
         r.start_ns - r.earliest_ns - r.idle_ns

@@ -1,5 +1,3 @@
--- name: derive.queue_activity
--- kind: macro
 -- description: What the threads of events executors did between callbacks. A kernel trace shows
 --     when they slept: there they waited for work, else they looked for it. Without one, such a
 --     thread waited for certain until the next callback became due: its message was published, or
@@ -84,8 +82,7 @@ seen AS (
 ),
 pause AS MATERIALIZED (
     SELECT
-        thread_id,
-        end_ns AS start_ns,
+        thread_id, end_ns AS start_ns,
         lead(start_ns) OVER on_thread AS end_ns,
         lead(due_ns) OVER on_thread AS due_ns
     FROM seen
@@ -101,8 +98,7 @@ slept AS MATERIALIZED (
 -- It is awake from the begin of a pause, or the end of a sleep, to the next sleep.
 awake AS (
     SELECT
-        thread_id,
-        from_ns AS start_ns,
+        thread_id, from_ns AS start_ns,
         coalesce(lead(until_ns) OVER (PARTITION BY thread_id, pause_ns ORDER BY from_ns), end_ns)
             AS end_ns
     FROM (

@@ -1,5 +1,3 @@
--- name: derive.thread_activity
--- kind: macro
 -- description: What executor threads did, in detail (main.executor_activity), by the clock of their
 --     executor: all activities that reach into a window. A few around it may be there as well, and
 --     the end of those behind it is not known.
@@ -39,8 +37,7 @@ closed AS (
         i.run_id, i.thread_id, i.effective_end_event_id AS event_id, any_value(x.at_ns) AS at_ns,
         i.callback_instance_id, i.parent_id
     FROM instance AS i
-    JOIN outside AS x
-        ON i.thread_id = x.thread_id AND i.effective_end_event_id = x.event_id
+    JOIN outside AS x ON i.thread_id = x.thread_id AND i.effective_end_event_id = x.event_id
     WHERE i.end_event_id IS NULL
     GROUP BY ALL
 ),
@@ -54,8 +51,7 @@ change AS (
     FROM instance
     WHERE end_event_id IS NOT NULL
     UNION ALL
-    SELECT run_id, thread_id, event_id, 1, at_ns, parent_id, 0, NULL
-    FROM closed
+    SELECT run_id, thread_id, event_id, 1, at_ns, parent_id, 0, NULL FROM closed
     UNION ALL
     SELECT
         run_id, thread_id, start_event_id, 2, start_ns, NULL,
@@ -121,9 +117,7 @@ situation AS (
     LEFT JOIN reach AS r ON m.thread_id = r.thread_id
     WHERE coalesce(m.event_id >= r.first_event_id, true)
         AND coalesce(m.event_id <= r.last_event_id, true)
-    WINDOW so_far AS (
-        PARTITION BY m.run_id, m.thread_id ORDER BY m.place ROWS UNBOUNDED PRECEDING
-    )
+    WINDOW so_far AS (PARTITION BY m.run_id, m.thread_id ORDER BY m.place ROWS UNBOUNDED PRECEDING)
 ),
 -- A take while the executor executes is what it is about to do anyway.
 split AS (
@@ -141,9 +135,7 @@ split AS (
     WINDOW on_thread AS (PARTITION BY run_id, thread_id ORDER BY place)
 ),
 run_change AS (
-    SELECT thread_id, event_id * 4 + step AS run_mark, running_id
-    FROM change
-    WHERE step IN (1, 3)
+    SELECT thread_id, event_id * 4 + step AS run_mark, running_id FROM change WHERE step IN (1, 3)
 ),
 described AS (
     SELECT
@@ -151,8 +143,7 @@ described AS (
         s.state,
         s.kind IS NOT NULL AS has_callback,
         coalesce(s.run_event_id > s.state_event_id, false) AS has_run,
-        i.callback_instance_id,
-        i.kind,
+        i.callback_instance_id, i.kind,
         s.state > 0 AND coalesce(s.state_event_id > i.start_event_id, true) AS is_spinning
     FROM split AS s
     LEFT JOIN run_change AS r ON s.thread_id = r.thread_id AND s.run_mark = r.run_mark
@@ -163,10 +154,7 @@ described AS (
 ),
 classified AS (
     SELECT
-        t.run_id,
-        t.thread_id,
-        x.executor_id,
-        t.at_ns AS start_ns,
+        t.run_id, t.thread_id, x.executor_id, t.at_ns AS start_ns,
         CASE WHEN t.next_step > 0 THEN t.next_ns END AS end_ns,
         t.callback_instance_id,
         CASE

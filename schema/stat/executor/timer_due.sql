@@ -1,5 +1,3 @@
--- name: derive.timer_due
--- kind: macro
 -- description: When timers were due: at whole numbers of periods after their creation, at the
 --     first of these moments after the previous call. No event tells that a timer was reset,
 --     cancelled for a while, or runs on simulated time. So a moment is only known where half of the
@@ -14,8 +12,7 @@
 CREATE OR REPLACE MACRO derive.timer_due(executors) AS TABLE
 WITH RECURSIVE call AS MATERIALIZED (
     SELECT
-        i.callback_id, i.callback_instance_id, x.executor_id, i.start_ns, t.period_ns,
-        t.created_ns,
+        i.callback_id, i.callback_instance_id, x.executor_id, i.start_ns, t.period_ns, t.created_ns,
         (i.start_ns - t.created_ns) // greatest(10 * t.period_ns, 1000000000) AS slice,
         -- What waking takes, and clocks drift in a period.
         least(t.period_ns // 10, 1000000 + t.period_ns // 10000) AS slack_ns,

@@ -1,4 +1,3 @@
--- name: staging.callback_batch
 -- description: Takes that come in batches: an executor such as that of r2r takes a message of every
 --     subscription that has one, and calls their callbacks only then. A callback_start of a known
 --     subscription that follows no take of it has the oldest take of that subscription on its
@@ -31,8 +30,7 @@ step AS (
     ANTI JOIN staging.callback_binding AS c ON t.start_event_id = c.take_event_id
     WHERE t.method <> 'ring_buffer'
     UNION ALL
-    SELECT event_id, thread_id, subscription_event_id, previous_executor_event_id, false
-    FROM begun
+    SELECT event_id, thread_id, subscription_event_id, previous_executor_event_id, false FROM begun
 ),
 unbroken AS (
     SELECT s.*, coalesce(k.resumed_event_id, 0) AS since_event_id
@@ -74,7 +72,5 @@ JOIN numbered AS t
     AND c.subscription_event_id = t.subscription_event_id
     AND c.since_event_id = t.since_event_id
     AND c.number = t.number
-WHERE NOT c.is_take
-    AND t.is_take
-    AND coalesce(c.previous_executor_event_id < t.event_id, true)
+WHERE NOT c.is_take AND t.is_take AND coalesce(c.previous_executor_event_id < t.event_id, true)
 QUALIFY row_number() OVER (PARTITION BY t.event_id ORDER BY c.event_id) = 1

@@ -1,4 +1,3 @@
--- name: staging.callback_binding
 -- description: Callback instances with their callback object, and the take or the request that
 --     they were called with. The callback_start directly follows the take's last layer, or the
 --     rmw_take_request, on its thread, with no event of the executor between the two. Neither an
@@ -12,9 +11,7 @@ WITH begun AS NOT MATERIALIZED (
         previous_event_id, previous_executor_event_id
     FROM staging.callback_pair
 ),
-known AS (
-    SELECT event_id, process_id, callback_handle AS handle FROM staging.callback_known
-),
+known AS (SELECT event_id, process_id, callback_handle AS handle FROM staging.callback_known),
 run AS (
     SELECT
         b.event_id AS start_event_id, b.process_id, b.handle AS callback_handle,
@@ -30,13 +27,8 @@ run AS (
     LEFT JOIN staging.callback_known AS k ON b.object_event_id = k.event_id
 )
 SELECT
-    r.start_event_id,
-    r.process_id,
-    r.callback_handle,
-    r.is_intra_process,
-    r.callback_event_id,
-    r.kind,
-    t.start_event_id AS take_event_id,
+    r.start_event_id, r.process_id, r.callback_handle, r.is_intra_process, r.callback_event_id,
+    r.kind, t.start_event_id AS take_event_id,
     coalesce(r.subscription_event_id, t.subscription_event_id) AS subscription_event_id,
     coalesce(q.event_id, p.request_event_id) AS request_event_id
 FROM run AS r

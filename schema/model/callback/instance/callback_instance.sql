@@ -1,4 +1,3 @@
--- name: staging.callback_instance
 -- kind: inline
 -- description: Callback instances, numbered in the order in which they began, with the one that
 --     each is nested in.
@@ -6,20 +5,10 @@
 SELECT
     n.callback_instance_id,
     r.trace_index + 1 AS trace_id,
-    n.callback_id,
-    r.process_id,
-    r.thread_id,
-    r.start_ns,
+    n.callback_id, r.process_id, r.thread_id, r.start_ns,
     coalesce(r.end_ns, d.end_ns) AS end_ns,
-    n.take_id,
-    q.request_id,
-    y.response_id,
-    f.callback_instance_id AS continues_id,
-    r.is_intra_process,
-    p.parent_id,
-    r.depth,
-    r.start_event_id,
-    r.end_event_id,
+    n.take_id, q.request_id, y.response_id, f.callback_instance_id AS continues_id,
+    r.is_intra_process, p.parent_id, r.depth, r.start_event_id, r.end_event_id,
     r.effective_end_event_id,
     g.start_event_id IS NOT NULL AS is_loss_affected
 FROM staging.callback_run AS r

@@ -1,4 +1,3 @@
--- name: staging.callback_known
 -- description: Callback objects whose creation was traced, with what they belong to, each by the
 --     event that initialised it. A callback that was only registered has a symbol but no owner; a
 --     function of Python never has one. A service that was not seen to be initialised is known by
@@ -40,9 +39,7 @@ registered AS (
         a.event_id AS added_event_id
     FROM staging.located('ros2_rclcpp_callback_register') AS r
     ASOF LEFT JOIN added AS a
-        ON r.process_id = a.process_id
-        AND r.callback = a.callback
-        AND r.event_id >= a.event_id
+        ON r.process_id = a.process_id AND r.callback = a.callback AND r.event_id >= a.event_id
     WHERE r.symbol NOT LIKE '#msgflow %' OR r.symbol LIKE '#msgflow function %'
 ),
 symbol_of AS (
@@ -57,7 +54,6 @@ SELECT
 FROM added AS a
 LEFT JOIN symbol_of AS s ON a.event_id = s.added_event_id
 UNION ALL
-SELECT
-    event_id, ts_ns, process_id, callback, kind, NULL, NULL, NULL, NULL, symbol
+SELECT event_id, ts_ns, process_id, callback, kind, NULL, NULL, NULL, NULL, symbol
 FROM registered
 WHERE added_event_id IS NULL

@@ -1,4 +1,3 @@
--- name: staging.callback_number
 -- description: The number of each callback instance, in the order in which they began, with its
 --     callback and the take that it was called with. A step of its own: looked up for the whole
 --     instances at once, all three would stay in memory beside them.

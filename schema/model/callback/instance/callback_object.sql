@@ -1,4 +1,3 @@
--- name: staging.callback_object
 -- description: Callback objects, numbered in the order in which they were made. One whose creation
 --     was not traced counts from its first instance.
 -- grain: one row per callback object
@@ -16,5 +15,4 @@ WITH every_callback AS (
     WHERE callback_event_id IS NULL
     GROUP BY process_id, callback_handle
 )
-SELECT row_number() OVER (ORDER BY event_id) AS callback_id, *
-FROM every_callback
+SELECT row_number() OVER (ORDER BY event_id) AS callback_id, * FROM every_callback

@@ -1,4 +1,3 @@
--- name: staging.callback_step
 -- description: Callback instances of Python that go on for something earlier: later steps of a
 --     coroutine, tasks, what is done with a response. Each with what it follows from: the instance
 --     on whose thread, and inside of which, the tracer said so (`step`); else what the thread took
@@ -22,9 +21,7 @@ origin AS (
         greatest(m.previous_callback_event_id, m.previous_executor_event_id) AS turn_event_id
     FROM resumed AS r
     ASOF JOIN (FROM staging.python_mark WHERE kind = 'step') AS m
-        ON r.process_id = m.process_id
-        AND r.number = m.number
-        AND r.start_event_id > m.event_id
+        ON r.process_id = m.process_id AND r.number = m.number AND r.start_event_id > m.event_id
 ),
 inside AS (
     SELECT o.start_event_id, b.start_event_id AS call_event_id

@@ -1,4 +1,3 @@
--- name: staging.deferred_end
 -- description: When callbacks of services were over that answer later. Before Kilted, rclcpp
 --     records no end of such a callback: none of its instances has one. Then the next executor
 --     event of the thread is the end, at the latest: a thread of a multi-threaded executor may be

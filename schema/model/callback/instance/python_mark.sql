@@ -1,4 +1,3 @@
--- name: staging.python_mark
 -- description: What the tracer of Python nodes (msgflow record) says besides the events of rclcpp:
 --     which processes it traces (`python`), which executor a thread works for (`executor`), that
 --     something will go on later because of what runs (`step`), and that the next callback of the

@@ -1,12 +1,9 @@
--- name: staging.user_event
 -- description: Events of the user's own programs, numbered in their order, with the callback
 --     instance inside which each happened: of those that began on its thread the last, unless it
 --     was over; else the nearest one around that which was not over.
 -- grain: one row per event of a name that the user asked for
 -- when: raw.user_event
-WITH RECURSIVE event AS MATERIALIZED (
-    SELECT * FROM staging.located('user_event')
-),
+WITH RECURSIVE event AS MATERIALIZED (SELECT * FROM staging.located('user_event')),
 run AS MATERIALIZED (
     SELECT
         i.callback_instance_id, i.start_event_id, i.thread_id, i.effective_end_event_id,
@@ -31,12 +28,7 @@ around AS (
 SELECT
     row_number() OVER (ORDER BY e.event_id) AS user_event_id,
     e.trace_index + 1 AS trace_id,
-    e.process_id,
-    e.thread_id,
-    e.cpu_id AS cpu,
-    e.ts_ns AS at_ns,
-    e.name,
-    a.callback_instance_id,
+    e.process_id, e.thread_id, e.cpu_id AS cpu, e.ts_ns AS at_ns, e.name, a.callback_instance_id,
     e.fields,
     coalesce(a.is_loss_affected, false) AS is_loss_affected
 FROM event AS e

@@ -1,4 +1,3 @@
--- name: staging.callback
 -- description: Callback objects with what they belong to. One whose creation was not traced learns
 --     its subscription or service from the messages or requests that it was called with (the most
 --     frequent), else what it belongs to from the executor.
@@ -6,9 +5,7 @@
 -- when: staging.callback_object
 WITH learned AS (
     SELECT
-        b.process_id,
-        b.callback_handle,
-        b.callback_event_id,
+        b.process_id, b.callback_handle, b.callback_event_id,
         mode(t.subscription_id ORDER BY t.subscription_id) AS subscription_id
     FROM staging.callback_binding AS b
     JOIN staging.take_subscription AS t ON b.start_event_id = t.callback_start_event_id
@@ -17,9 +14,7 @@ WITH learned AS (
 ),
 asked AS (
     SELECT
-        b.process_id,
-        b.callback_handle,
-        b.callback_event_id,
+        b.process_id, b.callback_handle, b.callback_event_id,
         mode(s.service_id ORDER BY s.service_id) AS service_id
     FROM staging.callback_binding AS b
     JOIN staging.service_event AS e ON b.request_event_id = e.event_id
@@ -74,16 +69,9 @@ complete AS (
         AND c.callback_event_id IS NOT DISTINCT FROM v.callback_event_id
 )
 SELECT
-    c.callback_id,
-    c.process_id,
+    c.callback_id, c.process_id,
     coalesce(c.node_id, s.node_id, v.node_id) AS node_id,
-    c.kind,
-    c.subscription_id,
-    c.timer_id,
-    c.service_id,
-    c.callback_handle,
-    c.symbol,
-    c.created_ns,
+    c.kind, c.subscription_id, c.timer_id, c.service_id, c.callback_handle, c.symbol, c.created_ns,
     c.event_id
 FROM complete AS c
 LEFT JOIN staging.subscription AS s ON c.subscription_id = s.subscription_id

@@ -1,4 +1,3 @@
--- name: staging.callback_owner
 -- description: What callbacks belong to whose creation was not traced, and that no message or
 --     request was seen to be for. The executor tells, as far as it can. It may name a handle that
 --     is known. Else, what it names is a timer or a subscription: where takes were enabled, what
@@ -63,8 +62,7 @@ served AS (
 behind AS (
     SELECT c.start_event_id, c.process_id, c.thread_id, s.start_event_id AS served_event_id
     FROM candidate AS c
-    ASOF JOIN served AS s
-        ON c.thread_id = s.thread_id AND c.start_event_id > s.start_event_id
+    ASOF JOIN served AS s ON c.thread_id = s.thread_id AND c.start_event_id > s.start_event_id
 ),
 waited AS (
     SELECT thread_id, event_id
@@ -83,8 +81,7 @@ same_round AS (
     SELECT b.process_id
     FROM behind AS b
     ANTI JOIN interrupted AS i ON b.start_event_id = i.start_event_id
-    ASOF LEFT JOIN waited AS w
-        ON b.thread_id = w.thread_id AND b.start_event_id > w.event_id
+    ASOF LEFT JOIN waited AS w ON b.thread_id = w.thread_id AND b.start_event_id > w.event_id
     -- No wait at all was seen before, or only earlier ones.
     WHERE w.thread_id IS NULL OR w.event_id < b.served_event_id
 ),

@@ -1,4 +1,3 @@
--- name: staging.callback_owner_announced
 -- description: Callbacks without a known owner, if the executor said the same before each of their
 --     instances: the handle that it named (NULL if it named none), the timer or subscription of
 --     that handle if the trace has it, and which tracepoints were enabled meanwhile.
@@ -43,6 +42,4 @@ SELECT
     AND count(*) OVER (PARTITION BY a.process_id, a.handle, o.owner_event_id) > 1 AS is_disputed
 FROM agreed AS a
 ASOF LEFT JOIN owner AS o
-    ON a.process_id = o.process_id
-    AND a.handle = o.handle
-    AND a.start_event_id >= o.event_id
+    ON a.process_id = o.process_id AND a.handle = o.handle AND a.start_event_id >= o.event_id

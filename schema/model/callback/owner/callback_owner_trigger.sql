@@ -1,4 +1,3 @@
--- name: staging.callback_owner_trigger
 -- description: Executor events directly before callback instances without a known owner. The
 --     creation of such a callback was not traced, and no message or request was ever seen to be for
 --     it. The executor names the handle that it executes, if that is a timer or a subscription.

@@ -1,4 +1,3 @@
--- name: staging.agnocast_run
 -- description: Which runs of callbacks are Agnocast's.
 -- grain: one row per such run
 -- when: raw.agnocast_agnocast_callable_start

@@ -1,4 +1,3 @@
--- name: staging.callback_nesting
 -- description: How deep callback instances are nested on their thread, from 1, and the instance
 --     around each. Others may be inside an instance that has a begin or an end of a callback before
 --     its own end, and inside one that was never seen to end. The latter lasts, for what is inside
@@ -16,8 +15,7 @@ closed_by AS (
     SELECT o.start_event_id, min(e.event_id) AS event_id
     FROM never_ended AS o
     JOIN (
-        SELECT event_id, thread_id, previous_callback_event_id
-        FROM staging.callback_pair_left_over
+        SELECT event_id, thread_id, previous_callback_event_id FROM staging.callback_pair_left_over
         UNION ALL
         SELECT start_event_id, thread_id, previous_callback_event_id
         FROM staging.callback_pair_plain
@@ -35,8 +33,7 @@ closed_by AS (
     UNION ALL
     SELECT o.start_event_id, x.event_id
     FROM never_ended AS o
-    JOIN staging.executor_first AS x
-        ON o.thread_id = x.thread_id AND x.event_id > o.start_event_id
+    JOIN staging.executor_first AS x ON o.thread_id = x.thread_id AND x.event_id > o.start_event_id
     UNION ALL
     SELECT o.start_event_id, g.event_id
     FROM never_ended AS o
@@ -44,14 +41,11 @@ closed_by AS (
         ON o.thread_id = g.thread_id AND o.start_event_id < g.event_id
 ),
 effective_end AS (
-    SELECT start_event_id, min(event_id) AS event_id
-    FROM closed_by
-    GROUP BY start_event_id
+    SELECT start_event_id, min(event_id) AS event_id FROM closed_by GROUP BY start_event_id
 ),
 outer_run AS MATERIALIZED (
     SELECT
-        p.event_id AS start_event_id,
-        p.thread_id,
+        p.event_id AS start_event_id, p.thread_id,
         coalesce(p.partner_event_id, e.event_id, t.last_event_id + 1) AS effective_end_event_id
     FROM staging.callback_pair_left_over AS p
     JOIN staging.thread AS t ON p.thread_id = t.thread_id
@@ -84,6 +78,4 @@ SELECT
 FROM nested AS i
 LEFT JOIN outer_run AS e ON i.start_event_id = e.start_event_id
 ASOF LEFT JOIN (SELECT * FROM nested WHERE NOT is_plain) AS o
-    ON i.thread_id = o.thread_id
-    AND i.depth - 1 = o.depth
-    AND i.start_event_id > o.start_event_id
+    ON i.thread_id = o.thread_id AND i.depth - 1 = o.depth AND i.start_event_id > o.start_event_id

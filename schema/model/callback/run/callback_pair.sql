@@ -1,4 +1,3 @@
--- name: staging.callback_pair
 -- kind: inline
 -- description: Begins of callbacks with their end: the plain ones, and those left over. `is_plain`
 --     where no other begin or end of a callback lies between.

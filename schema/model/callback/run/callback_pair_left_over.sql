@@ -1,4 +1,3 @@
--- name: staging.callback_pair_left_over
 -- description: Begins and ends of callbacks that are not plain, each with its partner. A begin is
 --     paired with the next event of the same callback on its thread, if that is an end. Ends left
 --     over (recursion) belong to the latest begin left over (a callback that spins and is called
@@ -33,17 +32,10 @@ located AS (
 ),
 callback_event AS MATERIALIZED (
     SELECT
-        e.event_id,
-        e.ts_ns,
-        e.trace_index,
-        e.thread_id,
-        e.process_id,
-        e.callback_handle,
-        e.is_start,
-        e.is_intra_process,
+        e.event_id, e.ts_ns, e.trace_index, e.thread_id, e.process_id, e.callback_handle,
+        e.is_start, e.is_intra_process,
         CASE WHEN c.event_id IS NULL THEN e.previous_call_event_id END AS previous_event_id,
-        e.previous_callback_event_id,
-        e.previous_executor_event_id,
+        e.previous_callback_event_id, e.previous_executor_event_id,
         CASE WHEN x.event_id IS NULL THEN e.previous_executor_event_id END AS executor_event_id,
         coalesce(i.segment, 0) AS segment
     FROM located AS e
@@ -78,8 +70,7 @@ left_over AS (
     QUALIFY bool_or(partner_event_id IS NOT NULL) OVER ()
 ),
 paired AS (
-    SELECT
-        event_id, max(partner_event_id) AS partner_event_id, max(partner_ns) AS partner_ns
+    SELECT event_id, max(partner_event_id) AS partner_event_id, max(partner_ns) AS partner_ns
     FROM left_over
     GROUP BY event_id
 )

@@ -1,21 +1,13 @@
--- name: staging.callback_pair_plain
 -- description: Begins of callbacks whose end is the next begin or end of any callback on their
 --     thread, with that end. No gap lies between.
 -- grain: one row per such begin and end
 -- when: raw.ros2_callback_start
 SELECT
-    s.event_id AS start_event_id,
-    e.event_id AS end_event_id,
-    s.ts_ns AS start_ns,
-    e.ts_ns AS end_ns,
-    s.trace_index,
-    c.thread_id,
-    c.process_id,
-    s.callback AS callback_handle,
+    s.event_id AS start_event_id, e.event_id AS end_event_id, s.ts_ns AS start_ns,
+    e.ts_ns AS end_ns, s.trace_index, c.thread_id, c.process_id, s.callback AS callback_handle,
     coalesce(s.is_intra_process = 1, false) AS is_intra_process,
     CASE WHEN g.event_id IS NULL THEN s.previous_call_event_id END AS previous_event_id,
-    s.previous_callback_event_id,
-    s.previous_executor_event_id,
+    s.previous_callback_event_id, s.previous_executor_event_id,
     CASE WHEN x.event_id IS NULL THEN s.previous_executor_event_id END AS executor_event_id
 FROM raw.ros2_callback_start AS s
 JOIN raw.ros2_callback_end AS e

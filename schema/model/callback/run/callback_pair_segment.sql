@@ -1,4 +1,3 @@
--- name: staging.callback_pair_segment
 -- description: How many gaps threads had seen at each begin and end of a callback, where they saw
 --     any at all.
 -- grain: one row per callback_start or callback_end behind the first gap of its thread
