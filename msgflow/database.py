@@ -481,9 +481,17 @@ class Database:
         part: Slice,
     ) -> dict[str, list[str]]:
         """Return the arguments of `query` that a named path stands for."""
-        if not any(param.name == "from" for param in header.params):
+        from msgflow.query.selection import PATH, columns_of
+
+        words: dict[str, list[str]] = {}
+        params = {param.name for param in header.params}
+        if "from" in params:
+            words = _words_of_path(connection, name, file, part)
+            if columns_of(header, PATH):
+                params |= {"via", "without"}
+        if not words or not words.keys() <= params:
             raise UsageError(f"{header.words} has no paths — --path {name}", "leave it out")
-        return _words_of_path(connection, name, file, part)
+        return words
 
     def why(self, place: str | None = None, **part: Unpack[SliceWords]) -> Explanation:
         """Explain why a topic is late: who is to blame, where the time goes, what to ask next.

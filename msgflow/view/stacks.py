@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from msgflow.query.catalogue import load_query
-from msgflow.query.path_numbers import only_path
 from msgflow.query.runner import Steps, bind
 from msgflow.sql.statement import internal_sql
 
@@ -36,12 +35,11 @@ def stacks_of_path(
     run: Run,
     window: Window,
     path: str,
-    every: Sequence[str],
     slowest: int,
 ) -> tuple[pa.Table, pa.Table]:
     """Return stacks on the way of so many slowest flows of a path, and of its other flows."""
     header = load_query("functions")
-    chosen = bind(header, {name: [*each] for name, each in only_path(path, every).items()})
+    chosen = bind(header, {"via": [path]})
     with Steps(connection) as steps:
         steps.make(header, {"runs": [run.run_id], **chosen, **window.bindings})
         found = connection.table("function_instance").fetchall()
