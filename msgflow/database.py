@@ -440,16 +440,19 @@ class Database:
         from msgflow.query.names import names_in
         from msgflow.query.path_numbers import with_path_numbers
         from msgflow.query.runner import run_query
-        from msgflow.query.selection import make_selection
+        from msgflow.query.selection import PATH, columns_of, make_selection
 
         header = choose_query(name, parameters, public_names)
         part = Slice(run, start, end)
         if path is not None:
             if via or without or {"from", "from_", "to", "to_"} & set(parameters):
                 raise _path_and_others(path)
-            if not any(param.name == "from" for param in header.params):
+            takes = {param.name for param in header.params}
+            if columns_of(header, PATH):
+                takes |= {"via", "without"}
+            words = self._ask(_words_of_path, path, Path(paths), part) if "from" in takes else {}
+            if not words or not words.keys() <= takes:
                 raise UsageError(f"{header.words} has no paths — --path {path}", "leave it out")
-            words = self._ask(_words_of_path, path, Path(paths), part)
             via, without = words.pop("via", None), words.pop("without", None)
             parameters |= {word: [*names] for word, names in words.items()}
         selection = {

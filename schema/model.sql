@@ -246,7 +246,7 @@ CREATE TABLE staging.stack_frame (stack_frame_id BIGINT, function VARCHAR, file 
 CREATE TABLE staging.stack_sample (process_id BIGINT, thread_id BIGINT, tid INTEGER, at_ns BIGINT,
     cpu INTEGER, callback_instance_id BIGINT, stack_id BIGINT, cpu_ns BIGINT);
 CREATE TABLE staging.stack_text (stack VARCHAR, calls STRUCT("function" VARCHAR, file VARCHAR)[],
-    is_cut BOOLEAN);
+    ran BIGINT, is_cut BOOLEAN);
 CREATE TABLE staging.subscription (subscription_id BIGINT, process_id BIGINT, node_id BIGINT,
     topic_name VARCHAR, subscription_handle UBIGINT, rmw_handle UBIGINT, gid BLOB,
     queue_depth BIGINT, created_ns BIGINT, is_internal BOOLEAN, is_inferred BOOLEAN,

@@ -879,7 +879,8 @@ CREATE TABLE store.stack_frame (
 CREATE TABLE store.stack (
     stack_id BIGINT PRIMARY KEY,  -- Identity of the stack
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
-    stack_frame_id BIGINT NOT NULL,  -- The function that ran: the innermost one {to stack_frame}
+    stack_frame_id BIGINT NOT NULL,  -- The function that ran: the innermost one, or the function of
+        -- Python that the interpreter ran {to stack_frame}
     depth INTEGER NOT NULL  -- How many calls it has
 );
 

@@ -9,7 +9,7 @@ from msgflow.errors import UsageError
 from msgflow.query.selection import PATH
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     import duckdb
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from msgflow.run.choice import Run
 
 _ALL = "main.flow_path($runs, only_paths := true)"
-_UNNAMED = ("?", "(not traced)")
 
 
 def with_path_numbers(
@@ -48,14 +47,7 @@ def numbered_path(
             f"no path has this number — {number}",
             f"msgflow query e2e-latency shows paths 1 to {len(every)}" if every else None,
         )
-    return only_path(every[number - 1], every)
-
-
-def only_path(path: str, every: Iterable[str]) -> dict[str, list[str]]:
-    """Return what tells a path from the others: the places that it visits, and those of others."""
-    via = _places(path)
-    others = {step for other in every for step in _places(other)}
-    return {"via": via, "without": sorted(others.difference(via))}
+    return {"via": [every[number - 1]]}
 
 
 def _every_path(
@@ -64,8 +56,3 @@ def _every_path(
     chosen = {"runs": [run.run_id for run in runs]} if known is _ALL else {}
     rows = connection.execute(f"SELECT DISTINCT path FROM {known}", chosen).fetchall()
     return sorted(path for (path,) in rows)
-
-
-def _places(path: str) -> list[str]:
-    """Return nodes, topics and services of a path; services stand in brackets there."""
-    return [step.strip("()") for step in path.split(" → ") if step not in _UNNAMED]

@@ -25,7 +25,6 @@ CUT_COLUMN = "is_cut"
 # Columns beside those of the query; the last is missing where no row is left.
 COUNTS = ("msgflow total", "msgflow hidden", "msgflow cut")
 PLACE = "msgflow place"
-_SEPARATOR = {PATH: " → "}
 
 
 @dataclass(frozen=True)
@@ -109,9 +108,7 @@ def conditions_of(header: Header, selection: Selection) -> tuple[list[str], dict
                     _what_it_has(header),
                 )
             bindings[f"selected_{kind}"] = list(names)
-            any_of = " OR ".join(
-                _is_any(header, column, f"$selected_{kind}", kind) for column in columns
-            )
+            any_of = " OR ".join(_is_any(header, column, f"$selected_{kind}") for column in columns)
             conditions.append(f"({any_of})")
     for word in ("via", "without"):
         if names := getattr(selection, word):
@@ -129,20 +126,20 @@ def columns_of(header: Header, kind: str) -> list[str]:
     return [column.name for column in header.columns if column.unit == kind]
 
 
-def _parts(header: Header, column: str, kind: str) -> str:
+def _parts(header: Header, column: str) -> str:
     """Return the names in a column, a list."""
     (kept,) = (known for known in header.columns if known.name == column)
     if kept.type.endswith("[]"):
         return f'result."{column}"'
-    parts = f"string_split(result.\"{column}\", '{_SEPARATOR.get(kind, ', ')}')"
+    parts = f"string_split(result.\"{column}\", ', ')"
     # A name may have the separator inside.
     return f'list_append({parts}, result."{column}")'
 
 
-def _is_any(header: Header, column: str, patterns: str, kind: str) -> str:
+def _is_any(header: Header, column: str, patterns: str) -> str:
     """Return the condition that one of the names in a column is one of the patterns."""
     return (
-        f"coalesce(list_bool_or(list_transform({_parts(header, column, kind)}, lambda name:"
+        f"coalesce(list_bool_or(list_transform({_parts(header, column)}, lambda name:"
         f" list_bool_or(list_transform({patterns}, lambda each:"
         " name = each OR name GLOB each)))), false)"
     )
@@ -150,15 +147,9 @@ def _is_any(header: Header, column: str, patterns: str, kind: str) -> str:
 
 def _visits(header: Header, word: str) -> str:
     (column,) = columns_of(header, PATH)
-    steps = _parts(header, column, PATH)
-    # Services stand in parentheses there.
-    visited = (
-        f"list_transform($selected_{word}, lambda each: list_bool_or(list_transform({steps},"
-        " lambda name: name = each OR name GLOB each OR trim(name, '()') GLOB each)))"
-    )
-    if word == "via":
-        return f"coalesce(list_bool_and({visited}), false)"
-    return f"NOT coalesce(list_bool_or({visited}), false)"
+    given = {"via": "NULL", "without": "NULL", word: f"$selected_{word}"}
+    visits = f'main.path_visits(result."{column}", {given["via"]}, {given["without"]})'
+    return f'(result."{column}" IS NOT NULL AND {visits})' if word == "via" else visits
 
 
 def _order(header: Header, selection: Selection) -> list[str]:

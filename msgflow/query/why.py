@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.errors import NoFlowError
 from msgflow.query.catalogue import load_query
 from msgflow.query.compare import warm_up_seconds
-from msgflow.query.path_numbers import only_path, with_path_numbers
+from msgflow.query.path_numbers import with_path_numbers
 from msgflow.query.runner import Steps, run_query
 from msgflow.sql.statement import internal_sql, registered
 from msgflow.text.values import format_duration
@@ -179,8 +179,7 @@ def _explained(
         verdict = internal_sql().run(connection, "verdict", values).to_arrow_table()
     path = _worst(verdict, paths)
     places = path.split(" → ")
-    # No path may pass what only others do.
-    flow = ask("critical-path", **ends, **only_path(path, shown), quantile="p95")
+    flow = ask("critical-path", **ends, via=[path], quantile="p95")
     pieces = flow.table.to_pylist()
     parts = _rows_where(parts, lambda row: row["path"] == path)
     callbacks = {(row["node"], row["what"]) for row in parts.table.to_pylist()}

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ from msgflow.record import perf
 from msgflow.trace.perf_script import DATA, TEXT, write_script
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
 # A clock of each CPU is there in virtual machines, too. Symbols are resolved at once: what perf
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 _OPTIONS = ("--event=cpu-clock", "--sample-cpu", "--no-buildid", "--no-buildid-cache")
 _MOST_HZ = 10_000
 _TOO_OLD = 12
+# `python3.12`, and no program whose name only begins so: it is executed to learn its version.
+_PYTHON = re.compile(r"(^|/)python[\d.]*$")
+_LONGEST_LINE = 256
 _PYTHON_NAMES = (
     f"import sys; sys.exit(0 if hasattr(sys, 'activate_stack_trampoline') else {_TOO_OLD})"
 )
@@ -81,13 +85,18 @@ def recorded_samples(
 
 
 def with_python_functions(
-    environment: dict[str, str], note: Callable[[str], None]
+    words: Sequence[str], environment: dict[str, str], note: Callable[[str], None]
 ) -> dict[str, str]:
-    """Return an environment in which perf sees the functions of Python, from 3.12 on."""
-    python = shutil.which("python3")
+    """Return an environment in which perf sees the functions of Python, from 3.12 on.
+
+    What a command runs is known if it is Python, or a script of Python, such as `ros2`.
+    """
+    python = _python_of(words[0], environment)
     code = 0
     if python is not None:
-        code = subprocess.run([python, "-c", _PYTHON_NAMES], stderr=subprocess.DEVNULL).returncode
+        code = subprocess.run(
+            [python, "-c", _PYTHON_NAMES], env=environment, stderr=subprocess.DEVNULL
+        ).returncode
     if code:
         why = "is older than 3.12" if code == _TOO_OLD else f"does not run (exit code {code})"
         note(
@@ -95,3 +104,16 @@ def with_python_functions(
             " have"
         )
     return {**environment, "PYTHONPERFSUPPORT": "1"}
+
+
+def _python_of(program: str, environment: Mapping[str, str]) -> str | None:
+    """Return the Python that a program is, or that runs it by its first line."""
+    path = environment.get("PATH")
+    found = shutil.which(program, path=path)
+    if found is None or _PYTHON.search(found):
+        return found
+    line = ""
+    with suppress(OSError), open(found, "rb") as file:
+        line = os.fsdecode(file.readline(_LONGEST_LINE))
+    words = line[2:].split() if line.startswith("#!") else []
+    return next((shutil.which(word, path=path) for word in words if _PYTHON.search(word)), None)

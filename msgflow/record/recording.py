@@ -137,7 +137,7 @@ def record(
                 if program:
                     environment = with_python_nodes(note) if python else dict(os.environ)
                     if profile is not None:
-                        environment = with_python_functions(environment, note)
+                        environment = with_python_functions(program, environment, note)
                     started = Program(program, output, environment)
                     # Behind the session: what happens while nodes end is not recorded.
                     running.callback(started.end, note)

@@ -224,9 +224,8 @@ def _stack(_: Pages, asked: Question) -> bytes:
         number, slowest = asked.whole("path"), asked.whole("slowest")
         if number not in paths:
             raise UsageError(f"the run has no such path — {number}")
-        every = sorted(set(paths.values()))
-        parts = stacks_of_path(asked, paths[number], every, slowest)
-        number = every.index(paths[number]) + 1
+        parts = stacks_of_path(asked, paths[number], slowest)
+        number = sorted(set(paths.values())).index(paths[number]) + 1
         words = ["query", "functions", "--path", str(number), "--slowest", str(slowest)]
     shown = [part.slice(0, MOST_STACKS) for part in parts]
     table = pa.concat_tables(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from msgflow.query.catalogue import load_query
-from msgflow.query.path_numbers import only_path
 from msgflow.query.runner import Steps, bind
 from msgflow.sql.statement import internal_sql
 
@@ -24,12 +23,10 @@ def stacks(asked: Question, instances: Sequence[int] | None = None) -> pa.Table:
     return table.sort_by([("samples", "descending"), ("stack", "ascending")])
 
 
-def stacks_of_path(
-    asked: Question, path: str, every: Sequence[str], slowest: int
-) -> tuple[pa.Table, pa.Table]:
+def stacks_of_path(asked: Question, path: str, slowest: int) -> tuple[pa.Table, pa.Table]:
     """Return stacks on the way of so many slowest flows of a path, and of its other flows."""
     header = load_query("functions")
-    chosen = bind(header, {name: [*each] for name, each in only_path(path, every).items()})
+    chosen = bind(header, {"via": [path]})
     with Steps(asked.connection) as steps:
         steps.make(header, {"runs": [asked.run.run_id], **chosen, **asked.window.bindings})
         found = asked.connection.table("function_instance").fetchall()

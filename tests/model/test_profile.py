@@ -197,6 +197,45 @@ def test_what_is_no_code_ends_a_stack(busy: RosSystem, analyse: Analyse) -> None
     ]
 
 
+PYTHON = "\t 99 py::hog_60:/src/robot.py (/tmp/perf-100.map)"
+LOOP = "\t 1 _PyEval_EvalFrameDefault (/usr/lib/libpython3.12.so.1.0)"
+
+
+@pytest.mark.parametrize(
+    ("lines", "ran"),
+    [
+        ([PYTHON], "hog_60"),
+        ([LOOP, PYTHON], "hog_60"),
+        (["\t 1 [unknown] (/usr/bin/python3.12)", PYTHON, LOOP], "hog_60"),
+        (
+            ["\t f do_syscall_64 ([kernel.kallsyms])", "\t 1 read (/lib/libc.so.6)", PYTHON],
+            "hog_60",
+        ),
+        (["\t 1 __vdso_clock_gettime ([vdso])", LOOP, PYTHON], "hog_60"),
+        (["\t 1 __tls_get_addr (/usr/lib/ld-linux-x86-64.so.2)", LOOP, PYTHON], "hog_60"),
+        (["\t 1 capture (/usr/lib/libcamera.so.0.3)", LOOP, PYTHON], "capture"),
+        ([LOOP, PYTHON, LOOP, PYTHON.replace("hog_60", "outer")], "hog_60"),
+        (["\t 1 dot (/lib/numpy/core/_umath.so)", LOOP, PYTHON], "dot"),
+        (["\t f read ([kernel.kallsyms])", "\t 1 write (/lib/libddsc.so)", PYTHON], "read"),
+        (["\t 1 [unknown] ([unknown])", PYTHON], "[unknown]"),
+        ([LOOP, "\t 1 main (/usr/bin/python3.12)"], "_PyEval_EvalFrameDefault"),
+        ([LOOP, "\t 1 [unknown] ([unknown])", PYTHON], "_PyEval_EvalFrameDefault"),
+        (["\t 1 py::call:x (/usr/lib/libpython3.12.so.1.0)", LOOP], "py::call:x"),
+    ],
+)
+def test_what_the_interpreter_does_for_a_function_of_python_that_function_does(
+    busy: RosSystem, analyse: Analyse, lines: list[str], ran: str
+) -> None:
+    """Functions of other libraries stand for themselves; no call is left out of the stack."""
+    busy.add_sample(head(3_000), *lines)
+    model = analyse(busy)
+    assert model.column("FROM stack JOIN stack_frame USING (stack_frame_id) SELECT function") == [
+        ran
+    ]
+    kept = next((at for at, line in enumerate(lines) if at and "([unknown])" in line), len(lines))
+    assert model.column("SELECT depth FROM stack") == [kept]
+
+
 def test_each_stack_is_stored_once(busy: RosSystem, analyse: Analyse) -> None:
     """Addresses in a function do not tell stacks apart."""
     for number in range(3):

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import duckdb
 import pytest
+from golden import fill_case
 
 from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.paths.paths_file import read_paths
 from msgflow.paths.suggested_paths import suggest_paths
 
+RING = Path(__file__).parents[1] / "query/cases/critical-path/path_in_another_order.case"
 GOOD = """\
 paths:
   - name: motors
@@ -58,6 +62,37 @@ def test_a_number_stands_for_a_path(database: Database) -> None:
     with pytest.raises(UsageError, match="no path has this number — 99") as raised:
         database.query("functions", path="99")
     assert raised.value.hint == f"msgflow query e2e-latency shows paths 1 to {len(every)}"
+
+
+def test_the_number_tells_paths_over_the_same_places_apart(
+    empty_database: Path, tmp_path: Path
+) -> None:
+    path = shutil.copyfile(empty_database, tmp_path / "ring.duckdb")
+    with duckdb.connect(str(path)) as connection:
+        fill_case(connection, RING)
+    with Database(path) as ring:
+        every = ring.query("e2e-latency").path_numbers
+        assert list(every) == ["/a → /x → /b → /y → /a", "/b → /y → /a → /x → /b"]
+        for name in ("e2e-latency", "critical-path", "path-breakdown"):
+            found = {
+                number: set(
+                    ring.query(name, path=str(number)).table["path"].drop_null().to_pylist()
+                )
+                for number in every.values()
+            }
+            assert found == {number: {text} for text, number in every.items()}
+
+
+def test_what_has_no_paths_says_so_in_the_words_of_the_user(
+    database: Database, tmp_path: Path
+) -> None:
+    """Between two ends, a path of all paths is no row; one that names its ends only, is."""
+    for path in ("info-nodes", "e2e-latency-ends"):
+        with pytest.raises(UsageError, match="has no paths — --path 2\n"):
+            database.query(path, path="2")
+    (file := tmp_path / "paths.yaml").write_text("paths:\n  - {name: a, from: /camera/image}\n")
+    (row,) = database.query("e2e-latency", by="ends", path="a", paths=file).table.to_pylist()
+    assert row["first_topic"] == "/camera/image"
 
 
 @pytest.mark.parametrize(

@@ -120,22 +120,40 @@ def test_a_recording_begins_when_perf_samples(
         assert (tmp_path / "enable").exists()
 
 
-def test_python_is_asked_to_name_its_functions(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_python_is_asked_to_name_its_functions(tmp_path: Path) -> None:
+    """Whether it can is asked of the Python that the command runs, where that is known."""
+    environment = {"PATH": str(tmp_path)}
     notes: list[str] = []
-    python = tmp_path / "python3"
-    python.write_text("#!/bin/sh\nexit 12\n")
-    python.chmod(0o755)
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert with_python_functions({"A": "b"}, notes.append) == {"A": "b", "PYTHONPERFSUPPORT": "1"}
-    assert "is older than 3.12" in notes[0]
-    python.write_text("#!/bin/sh\nexit 3\n")
-    with_python_functions({}, notes.append)
-    assert "does not run (exit code 3)" in notes[1]
-    python.write_text("#!/bin/sh\nexit 0\n")
-    with_python_functions({}, notes.append)
-    assert len(notes) == 2
+
+    def program(name: str, text: str) -> str:
+        (tmp_path / name).write_text(text)
+        (tmp_path / name).chmod(0o755)
+        return str(tmp_path / name)
+
+    def said(*words: str) -> list[str]:
+        notes.clear()
+        found = with_python_functions(words, environment, notes.append)
+        assert found == environment | {"PYTHONPERFSUPPORT": "1"}
+        return notes
+
+    old = program("python3", "#!/bin/sh\nexit 12\n")
+    program("python3.9", "#!/bin/sh\nexit 3\n")
+    program("python3.13", "#!/bin/sh\nexit 0\n")
+    (note,) = said("python3", "robot.py")
+    assert f"{old} is older than 3.12" in note
+    (note,) = said(str(tmp_path / "python3.9"), "robot.py")
+    assert "does not run (exit code 3)" in note
+    assert not said("python3.13", "robot.py")
+    for line in (f"#!{old}", "#!/usr/bin/env python3", f"#! {old} -sP"):
+        (note,) = said(program("ros2", line + "\nimport ros2cli\n"), "launch")
+        assert "is older than 3.12" in note
+    assert not said(program("ros2", "#!/usr/bin/env python3.13\n"))
+    # Nothing is known of others; none of them is executed.
+    for text in ("\x7fELF python3", "", "python3", "#!/bin/sh\npython3 robot.py\n"):
+        assert not said(program("robot", text))
+    assert not said(program("python_robot", f"#!/bin/sh\ntouch {tmp_path}/executed\nexit 12\n"))
+    assert not said("absent")
+    assert not (tmp_path / "executed").exists()
 
 
 @pytest.mark.thorough
@@ -210,12 +228,14 @@ def test_shares_of_known_functions_of_python(robot: list[str], tmp_path: Path) -
     )  # fmt: skip
     with Database(tmp_path / "msgflow.duckdb") as database:
         rows = database.query("functions").to_arrow().to_pylist()
+        why = database.why()
     found = {(row["callback"], row["function"]): row for row in rows if row["function"] in of_hogs}
     assert found.keys() == {
         ("Timer(100 ms)", "look"), *(("Subscription(/image)", name) for name in PYTHON_SHARES)
     }  # fmt: skip
     assert {Path(row["file"]).name for row in found.values()} == {"robot.py"}
-    assert sum(found["Subscription(/image)", name]["total_share"] for name in PYTHON_SHARES) > 0.7
+    assert sum(found["Subscription(/image)", name]["self_share"] for name in PYTHON_SHARES) > 0.7
+    assert any("Subscription(/image): hog_60 " in note for note in why.notes), why.notes
     counts = {name: found["Subscription(/image)", name]["samples"] for name in PYTHON_SHARES}
     samples = sum(counts.values())
     for name, share in PYTHON_SHARES.items():

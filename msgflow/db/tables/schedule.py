@@ -162,7 +162,12 @@ table(
 table(
     "stack",
     key("stack_id", "Identity of the stack"),
-    reference("stack_frame_id", "The function that ran: the innermost one", required=True),
+    reference(
+        "stack_frame_id",
+        "The function that ran: the innermost one, or the function of Python that the interpreter"
+        " ran",
+        required=True,
+    ),
     integer("depth", "How many calls it has", required=True),
     comment="One row per different stack",
     view="Stacks of calls that samples saw, each once, with the function that ran.",

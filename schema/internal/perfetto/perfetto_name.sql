@@ -1,5 +1,6 @@
 -- description: Names of slices. A slice refers to its name by code and id; id 0 is what is not
---     known. A client has two names: of its requests, and of calls that a callback waited for.
+--     known. Calls that a callback waited for have the name of their service; where the trace has no
+--     such service, each client has its own.
 -- grain: one row per name
 SELECT 0 AS code, callback_id AS id, node || ' ' || label AS name
 FROM main.callback_label
@@ -13,17 +14,17 @@ SELECT 2, subscription_id, 'take ' || coalesce(topic_name, '?')
 FROM main.subscription
 WHERE run_id = $run_id
 UNION ALL
-SELECT 3, 2 * client_id, 'request ' || coalesce(service_name, '?')
+SELECT 3, 3 * client_id, 'request ' || coalesce(service_name, '?')
 FROM main.client
 WHERE run_id = $run_id
 UNION ALL
 SELECT
-    3, 2 * coalesce(q.client_id, 0) + 1,
+    3, coalesce(3 * w.service_id + 1, 3 * coalesce(q.client_id, 0) + 2) AS called_id,
     min(printf('service %s (%s)', w.service_name, coalesce(w.server, '?')))
 FROM main.waited_call AS w
 JOIN main.request AS q ON w.request_id = q.request_id
 WHERE w.run_id = $run_id
-GROUP BY coalesce(q.client_id, 0)
+GROUP BY called_id
 UNION ALL
 SELECT 4, service_id, 'take request ' || coalesce(service_name, '?')
 FROM main.service

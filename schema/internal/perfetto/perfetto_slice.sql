@@ -4,7 +4,9 @@
 --     request or response that was traced.
 -- grain: one row per begin and end of a slice, and per moment
 WITH waited AS MATERIALIZED (
-    SELECT request_id, returned_ns, queue_ns, served_ns FROM main.waited_call WHERE run_id = $run_id
+    SELECT request_id, service_id, returned_ns, queue_ns, served_ns
+    FROM main.waited_call
+    WHERE run_id = $run_id
 ),
 slice AS MATERIALIZED (
     SELECT
@@ -27,7 +29,11 @@ slice AS MATERIALIZED (
     UNION ALL
     SELECT
         q.sender_thread_id * 8 + 2, q.sent_ns, coalesce(w.returned_ns, q.sent_ns), 3,
-        2 * coalesce(q.client_id, 0) + (w.request_id IS NOT NULL)::INTEGER, q.request_id, NULL
+        coalesce(
+            3 * w.service_id + 1,
+            3 * coalesce(q.client_id, 0) + 2 * (w.request_id IS NOT NULL)::INTEGER
+        ),
+        q.request_id, NULL
     FROM main.request AS q
     LEFT JOIN waited AS w ON q.request_id = w.request_id
     WHERE q.run_id = $run_id AND q.sent_ns >= $start_ns AND q.sent_ns < $end_ns

@@ -33,9 +33,12 @@ named AS (
     LEFT JOIN main.process AS p ON s.process_id = p.process_id
 )
 SELECT
-    -- A semicolon or the end of a line in a name would divide it.
+    -- A semicolon or the end of a line in a name would divide it; a terminal obeys other controls.
     array_to_string(
-        list_transform(steps, lambda step: regexp_replace(replace(step, ';', ':'), '\s', ' ', 'g')),
+        list_transform(
+            steps,
+            lambda step: regexp_replace(replace(step, ';', ':'), '[\s[:cntrl:]]', ' ', 'g')
+        ),
         ';'
     ) AS stack,
     sum(samples)::BIGINT AS samples

@@ -131,7 +131,7 @@ created AS (
         s.length_ns
     FROM main.node AS n
     JOIN span AS s ON n.run_id = s.run_id
-    WHERE NOT n.is_inferred AND n.created_ns IS NOT NULL
+    WHERE NOT n.is_inferred
 ),
 late AS (
     SELECT

@@ -1,6 +1,9 @@
 -- description: What perf wrote of each stack, and its calls, the outermost first. Where a function
 --     keeps no frame pointer, what comes above it in the stack is no code: it is cut off. Python
 --     names its functions as 'py::function:file', in a map of its own: C++ may have a namespace py.
+--     The function that ran is the innermost one; but what the interpreter, the C library and the
+--     kernel do for a function of Python alone, that function does. Other libraries, such as numpy,
+--     have functions of their own.
 -- grain: one row per different text
 -- when: staging.sample_text
 WITH line AS (
@@ -19,22 +22,41 @@ WITH line AS (
 ),
 whole AS (
     SELECT
-        *,
+        stack,
+        calls,
         coalesce(
-            list_position(list_transform(calls[2:], lambda call: call.file), '[unknown]'), 0
-        ) AS cut
+            list_position(list_transform(calls[2:], lambda call: call.file), '[unknown]'),
+            len(calls)
+        ) AS depth,
+        list_transform(
+            calls,
+            lambda call: CASE
+                WHEN call.function LIKE 'py::%' AND regexp_matches(call.file, '/perf-\d+\.map$')
+                    THEN 'python'
+                WHEN regexp_matches(
+                    call.file,
+                    '^\[(kernel|vdso)|/(lib)?python3[^/]*$|/(libc|ld-linux[^/]*)\.so[^/]*$'
+                ) THEN 'interpreter'
+                ELSE 'library'
+            END
+        ) AS kinds
     FROM line
+    WHERE len(calls) > 0
 )
 SELECT
     stack,
-    list_transform(
-        list_reverse(CASE WHEN cut > 0 THEN calls[:cut] ELSE calls END),
-        lambda call: CASE
-            WHEN call.function LIKE 'py::%' AND regexp_matches(call.file, '/perf-\d+\.map$')
+    list_reverse(list_transform(
+        calls[:depth],
+        lambda call, place: CASE
+            WHEN kinds[place] = 'python'
                 THEN regexp_extract(call.function, '^py::([^:]*):(.*)$', ['function', 'file'])
             ELSE call
         END
-    ) AS calls,
-    cut > 0 AS is_cut
+    )) AS calls,
+    CASE
+        WHEN list_position(kinds, 'python') < coalesce(list_position(kinds, 'library'), depth + 1)
+            THEN depth + 1 - list_position(kinds, 'python')
+        ELSE depth
+    END AS ran,
+    depth < len(calls) AS is_cut
 FROM whole
-WHERE len(calls) > 0
