@@ -79,21 +79,6 @@ holding AS (
         AND start_ns >= $start_ns AND start_ns < $end_ns
     GROUP BY callback_id
 ),
-calling AS (
-    SELECT
-        c.path, c.path_ns, c.limit_ns, c.call_ns, c.node AS client, v.service_name,
-        main.node_label(n.full_name, r.name, r.pid) AS server,
-        (
-            SELECT quantile_disc(i.end_ns - i.start_ns, 0.5)
-            FROM main.callback AS k
-            JOIN main.callback_instance AS i ON k.callback_id = i.callback_id
-            WHERE k.service_id = c.service_id AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
-        ) AS served_ns
-    FROM callback AS c
-    JOIN main.service AS v ON c.service_id = v.service_id
-    JOIN main.process AS r ON v.process_id = r.process_id
-    LEFT JOIN main.node AS n ON v.node_id = n.node_id
-),
 -- Subscriptions with messages that failed, from the first that they took on.
 failing AS (
     SELECT
@@ -258,14 +243,14 @@ FROM callback
 WHERE cpu_ns > 0
 UNION ALL
 SELECT
-    'service', server, service_name, path, call_ns,
+    'service', coalesce(server, 'a server that is not recorded'), service_name, path, call_ns,
     call_ns >= limit_ns AND call_ns >= 0.1 * path_ns,
     printf(
-        'its service %s keeps a callback of %s waiting for %s of %s', service_name, client,
+        'its service %s keeps a callback of %s waiting for %s of %s', service_name, node,
         main.duration_text(call_ns), main.duration_text(path_ns)
     )
     || coalesce(printf(' (it answers in %s)', main.duration_text(served_ns)), '')
-FROM calling
+FROM callback
 WHERE call_ns > 0
 UNION ALL
 SELECT

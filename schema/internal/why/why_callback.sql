@@ -14,7 +14,9 @@
 --     traced by the kernel
 -- column: cpu_by VARCHAR  What had it longest
 -- column: call_ns BIGINT [ns]  Calls of services for whose response it waited
--- column: service_id BIGINT  The service that it waited for longest
+-- column: service_name VARCHAR  The service that it waited for longest
+-- column: server VARCHAR  Node that offers it, or process in brackets; NULL: not in the trace
+-- column: served_ns BIGINT [ns]  Median time in which it answers; NULL: not known
 -- column: own_ns BIGINT [ns]  Before it, its executor ran the callback for earlier messages
 -- column: other_ns BIGINT [ns]  Before it, its executor ran other callbacks, at most
 -- column: beside_ns BIGINT [ns]  Before it, one other callback ran, on whatever thread of its
@@ -28,13 +30,12 @@ WITH chosen AS MATERIALIZED (
 ),
 call AS MATERIALIZED (
     SELECT
-        w.callback_instance_id, c.node, c.label, w.service_id,
-        sum(w.returned_ns - w.sent_ns)::BIGINT AS call_ns
+        w.callback_instance_id, c.node, c.label, w.service_name, w.server, w.served_ns,
+        w.returned_ns - w.sent_ns AS call_ns
     FROM main.waited_call AS w
     JOIN main.callback_instance AS i ON w.callback_instance_id = i.callback_instance_id
     JOIN chosen AS c ON i.callback_id = c.callback_id
     WHERE list_contains($runs, w.run_id)
-    GROUP BY w.callback_instance_id, c.node, c.label, w.service_id
 ),
 meanwhile AS (
     SELECT
@@ -126,7 +127,7 @@ measured AS (
 )
 SELECT
     m.node, m.label, m.usual_ns, m.run_ns, m.period_ns, m.computed_ns, m.cpu_ns, t.cpu_by,
-    m.call_ns, q.service_id, m.own_ns, m.other_ns, m.beside_ns, o.other_id
+    m.call_ns, q.service_name, q.server, q.served_ns, m.own_ns, m.other_ns, m.beside_ns, o.other_id
 FROM measured AS m
 LEFT JOIN (
     SELECT node, label, arg_max(name, total_ns) AS cpu_by
@@ -143,13 +144,12 @@ LEFT JOIN (
 ) AS t
     ON m.node = t.node AND m.label = t.label
 LEFT JOIN (
-    SELECT node, label, arg_max(service_id, total_ns) AS service_id
-    FROM (
-        SELECT node, label, service_id, sum(call_ns) AS total_ns
-        FROM call
-        GROUP BY node, label, service_id
-    )
-    GROUP BY node, label
+    SELECT node, label, service_name, server, quantile_disc(served_ns, 0.5) AS served_ns
+    FROM call
+    GROUP BY node, label, service_name, server
+    QUALIFY row_number() OVER (
+        PARTITION BY node, label ORDER BY sum(call_ns) DESC, service_name, server
+    ) = 1
 ) AS q
     ON m.node = q.node AND m.label = q.label
 LEFT JOIN (
