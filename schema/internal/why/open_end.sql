@@ -1,9 +1,30 @@
 -- name: internal.open_end
 -- title: Timers that may use what their node was told before
 -- description: Likely links that are not declared (main.dead_end), from messages that a node keeps
---     to timers of it.
+--     to timers of it. Of several timers the fastest uses them: others tell how the node is. So
+--     does a timer whose messages nobody gets, or that publishes where other nodes do, too
+--     (/diagnostics); and what runs for much less time than the callback of a message is not what
+--     uses it.
 -- grain: as main.dead_end
 -- when: main.finding WHERE name = 'dead_end' AND list_contains($runs, run_id)
-SELECT node_id, timer_id, topic_name
-FROM main.dead_end($runs)
-WHERE is_likely AND timer_id IS NOT NULL
+WITH spoken AS (
+    SELECT topic_name
+    FROM main.publisher
+    WHERE list_contains($runs, run_id)
+    GROUP BY topic_name
+    HAVING count(DISTINCT node_id) = 1
+),
+heard AS (
+    SELECT DISTINCT s.topic_name
+    FROM main.subscription AS s
+    SEMI JOIN main.take AS t ON s.subscription_id = t.subscription_id
+    WHERE list_contains($runs, s.run_id)
+)
+SELECT d.node_id, d.timer_id, d.topic_name
+FROM main.dead_end($runs) AS d
+JOIN main.timer AS t ON d.timer_id = t.timer_id
+WHERE d.is_likely
+    AND d.output_topic IN (SELECT topic_name FROM spoken)
+    AND d.output_topic IN (SELECT topic_name FROM heard)
+    AND coalesce(d.run_ns <= 2 * d.publishing_run_ns, true)
+QUALIFY t.period_ns = min(t.period_ns) OVER (PARTITION BY d.node_id, d.topic_name)
