@@ -1,12 +1,12 @@
 -- name: internal.open_end
 -- title: Timers that may use what their node was told before
--- description: Likely links that are not declared (main.dead_end), from messages that a node keeps
---     to timers of it. Of several timers the fastest uses them: others tell how the node is. So
---     does a timer whose messages nobody gets, or that publishes where other nodes do, too
---     (/diagnostics); and what runs for much less time than the callback of a message is not what
---     uses it.
+-- description: Links that may be missing (main.dead_end), from messages that a node keeps to timers
+--     of it; in a loop, too: what moves a robot is told where it is. Of several timers the fastest
+--     uses them: others tell how the node is. So does a timer whose messages nobody gets, or that
+--     publishes where other nodes do, too (/diagnostics). What runs for less than half as long as
+--     the callback of a message is not what uses it.
 -- grain: as main.dead_end
--- when: main.finding WHERE name = 'dead_end' AND list_contains($runs, run_id)
+-- when: main.timer WHERE node_id IN (SELECT node_id FROM main.subscription WHERE NOT is_internal)
 WITH spoken AS (
     SELECT topic_name
     FROM main.publisher
@@ -23,8 +23,7 @@ heard AS (
 SELECT d.node_id, d.timer_id, d.topic_name
 FROM main.dead_end($runs) AS d
 JOIN main.timer AS t ON d.timer_id = t.timer_id
-WHERE d.is_likely
-    AND d.output_topic IN (SELECT topic_name FROM spoken)
+WHERE d.output_topic IN (SELECT topic_name FROM spoken)
     AND d.output_topic IN (SELECT topic_name FROM heard)
     AND coalesce(d.run_ns <= 2 * d.publishing_run_ns, true)
 QUALIFY t.period_ns = min(t.period_ns) OVER (PARTITION BY d.node_id, d.topic_name)

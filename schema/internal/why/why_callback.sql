@@ -21,6 +21,7 @@
 -- column: other_ns BIGINT [ns]  Before it, its executor ran other callbacks, at most
 -- column: beside_ns BIGINT [ns]  Before it, one other callback ran, on whatever thread of its
 --     executor
+-- column: other_run_ns BIGINT [ns]  How long an instance of another callback took of that
 -- column: other_id BIGINT  The other callback that ran longest
 WITH chosen AS MATERIALIZED (
     SELECT callback_id, node, label
@@ -41,16 +42,30 @@ meanwhile AS (
     SELECT
         w.callback_instance_id, c.node, c.label,
         unnest(w.meanwhile_callback_ids) AS other_id,
-        unnest(w.meanwhile_ns) AS overlap_ns
+        unnest(w.meanwhile_ns) AS overlap_ns,
+        unnest(w.meanwhile_instances) AS instances
     FROM explained_wait AS w
     JOIN chosen AS c ON w.callback_id = c.callback_id
     WHERE w.start_ns >= $start_ns AND w.start_ns < $end_ns
 ),
+-- What took the CPU from a callback meanwhile is to blame for the rest, where the kernel shows it.
+computed AS (
+    SELECT
+        i.callback_id,
+        quantile_disc(i.end_ns - i.start_ns - s.preempted_ns - s.runnable_ns, 0.95) AS computed_ns
+    FROM main.callback_schedule AS s
+    JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
+    WHERE i.callback_id IN (SELECT other_id FROM meanwhile)
+        AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
+    GROUP BY i.callback_id
+),
 ran AS MATERIALIZED (
     SELECT
-        m.callback_instance_id, m.node, m.label, m.other_id, m.overlap_ns,
+        m.callback_instance_id, m.node, m.label, m.other_id,
+        least(m.overlap_ns, m.instances * p.computed_ns) AS overlap_ns, m.instances,
         o.callback_id IS NOT NULL AS is_own
     FROM meanwhile AS m
+    LEFT JOIN computed AS p ON m.other_id = p.callback_id
     LEFT JOIN chosen AS o
         ON m.other_id = o.callback_id AND m.node = o.node AND m.label = o.label
 ),
@@ -87,7 +102,8 @@ instance AS MATERIALIZED (
         least(
             greatest(w.busy_max_ns - coalesce(m.own_ns, 0), 0), coalesce(m.sum_ns, 0)
         ) AS other_ns,
-        coalesce(m.beside_ns, 0) AS beside_ns
+        coalesce(m.beside_ns, 0) AS beside_ns,
+        coalesce(m.other_run_ns, 0) AS other_run_ns
     FROM chosen AS c
     JOIN main.callback_instance AS i ON c.callback_id = i.callback_id
     LEFT JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
@@ -103,7 +119,8 @@ instance AS MATERIALIZED (
             callback_instance_id,
             sum(overlap_ns) FILTER (WHERE is_own)::BIGINT AS own_ns,
             sum(overlap_ns) FILTER (WHERE NOT is_own)::BIGINT AS sum_ns,
-            max(overlap_ns) FILTER (WHERE NOT is_own) AS beside_ns
+            max(overlap_ns) FILTER (WHERE NOT is_own) AS beside_ns,
+            max(overlap_ns // instances) FILTER (WHERE NOT is_own) AS other_run_ns
         FROM ran
         GROUP BY callback_instance_id
     ) AS m
@@ -121,13 +138,15 @@ measured AS (
         quantile_disc(call_ns, 0.95) AS call_ns,
         quantile_disc(own_ns, 0.95) AS own_ns,
         quantile_disc(other_ns, 0.95) AS other_ns,
-        quantile_disc(beside_ns, 0.95) AS beside_ns
+        quantile_disc(beside_ns, 0.95) AS beside_ns,
+        quantile_disc(other_run_ns, 0.95) AS other_run_ns
     FROM instance
     GROUP BY node, label
 )
 SELECT
     m.node, m.label, m.usual_ns, m.run_ns, m.period_ns, m.computed_ns, m.cpu_ns, t.cpu_by,
-    m.call_ns, q.service_name, q.server, q.served_ns, m.own_ns, m.other_ns, m.beside_ns, o.other_id
+    m.call_ns, q.service_name, q.server, q.served_ns, m.own_ns, m.other_ns, m.beside_ns,
+    m.other_run_ns, o.other_id
 FROM measured AS m
 LEFT JOIN (
     SELECT node, label, arg_max(name, total_ns) AS cpu_by
