@@ -300,6 +300,9 @@ SELECT
         main.duration_text(call_ns), main.duration_text(path_ns)
     )
     || coalesce(printf(' (it answers in %s)', main.duration_text(served_ns)), '')
+    || CASE WHEN is_recorded
+        THEN ''
+        ELSE ', as far as times show (requests are recorded since Kilted)' END
     || CASE WHEN queued_ns > 0.2 * call_ns
         THEN printf(', and further messages wait for that for %s', main.duration_text(queued_ns))
         ELSE '' END

@@ -17,6 +17,7 @@
 -- column: service_name VARCHAR  The service that it waited for longest
 -- column: server VARCHAR  Node that offers it, or process in brackets; NULL: not in the trace
 -- column: served_ns BIGINT [ns]  Median time in which it answers; NULL: not known
+-- column: is_recorded BOOLEAN  Requests show it; else that its callback ran within this one
 -- column: own_ns BIGINT [ns]  Before it, its executor ran the callback for earlier messages
 -- column: other_ns BIGINT [ns]  Before it, its executor ran other callbacks, at most
 -- column: beside_ns BIGINT [ns]  Before it, one other callback ran, on whatever thread of its
@@ -29,14 +30,45 @@ WITH chosen AS MATERIALIZED (
     WHERE list_contains($runs, run_id)
         AND (node, label) IN (SELECT (node, what) FROM breakdown)
 ),
+-- Releases before Kilted record no requests. Then a callback waits for a service if its process has
+-- a client of it, and nearly all that the service did happened in the callback.
+within AS (
+    SELECT
+        i.callback_instance_id, c.node, c.label, v.service_id, v.service_name, v.process_id,
+        v.node_id, j.end_ns - j.start_ns AS served_ns
+    FROM chosen AS c
+    JOIN main.callback_instance AS i ON c.callback_id = i.callback_id
+    JOIN main.client AS q ON i.process_id = q.process_id
+    JOIN main.service AS v ON q.run_id = v.run_id AND q.service_name = v.service_name
+    ANTI JOIN main.request AS r ON v.service_id = r.service_id
+    JOIN main.callback AS s ON v.service_id = s.service_id
+    JOIN main.callback_instance AS j
+        ON s.callback_id = j.callback_id AND i.start_ns < j.start_ns AND i.end_ns > j.end_ns
+),
+ran_at_all AS (
+    SELECT s.service_id, count(*) AS instances
+    FROM main.callback AS s
+    JOIN main.callback_instance AS j ON s.callback_id = j.callback_id
+    WHERE s.service_id IN (SELECT service_id FROM within)
+    GROUP BY s.service_id
+),
 call AS MATERIALIZED (
     SELECT
         w.callback_instance_id, c.node, c.label, w.service_name, w.server, w.served_ns,
-        w.returned_ns - w.sent_ns AS call_ns
+        w.returned_ns - w.sent_ns AS call_ns, true AS is_recorded
     FROM main.waited_call AS w
     JOIN main.callback_instance AS i ON w.callback_instance_id = i.callback_instance_id
     JOIN chosen AS c ON i.callback_id = c.callback_id
     WHERE list_contains($runs, w.run_id)
+    UNION ALL
+    SELECT
+        w.callback_instance_id, w.node, w.label, w.service_name,
+        main.node_label(n.full_name, r.name, r.pid), w.served_ns, w.served_ns, false
+    FROM within AS w
+    JOIN ran_at_all AS a ON w.service_id = a.service_id
+    JOIN main.process AS r ON w.process_id = r.process_id
+    LEFT JOIN main.node AS n ON w.node_id = n.node_id
+    QUALIFY count(*) OVER (PARTITION BY w.node, w.label, w.service_id) >= 0.9 * a.instances
 ),
 meanwhile AS (
     SELECT
@@ -145,8 +177,8 @@ measured AS (
 )
 SELECT
     m.node, m.label, m.usual_ns, m.run_ns, m.period_ns, m.computed_ns, m.cpu_ns, t.cpu_by,
-    m.call_ns, q.service_name, q.server, q.served_ns, m.own_ns, m.other_ns, m.beside_ns,
-    m.other_run_ns, o.other_id
+    m.call_ns, q.service_name, q.server, q.served_ns, q.is_recorded, m.own_ns, m.other_ns,
+    m.beside_ns, m.other_run_ns, o.other_id
 FROM measured AS m
 LEFT JOIN (
     SELECT node, label, arg_max(name, total_ns) AS cpu_by
@@ -163,9 +195,10 @@ LEFT JOIN (
 ) AS t
     ON m.node = t.node AND m.label = t.label
 LEFT JOIN (
-    SELECT node, label, service_name, server, quantile_disc(served_ns, 0.5) AS served_ns
+    SELECT
+        node, label, service_name, server, is_recorded, quantile_disc(served_ns, 0.5) AS served_ns
     FROM call
-    GROUP BY node, label, service_name, server
+    GROUP BY node, label, service_name, server, is_recorded
     QUALIFY row_number() OVER (
         PARTITION BY node, label ORDER BY sum(call_ns) DESC, service_name, server
     ) = 1
