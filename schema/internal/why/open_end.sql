@@ -3,8 +3,8 @@
 -- description: Links that may be missing (main.dead_end), from messages that a node keeps to timers
 --     of it; in a loop, too: what moves a robot is told where it is. Of several timers the fastest
 --     uses them: others tell how the node is. So does a timer whose messages nobody gets, or that
---     publishes where other nodes do, too (/diagnostics). What runs for less than half as long as
---     the callback of a message is not what uses it.
+--     publishes where other nodes do, too (/diagnostics). What runs for less than a tenth of the
+--     time that the callback of a message takes is not what uses it.
 -- grain: as main.dead_end
 -- when: main.timer WHERE node_id IN (SELECT node_id FROM main.subscription WHERE NOT is_internal)
 WITH spoken AS (
@@ -25,5 +25,5 @@ FROM main.dead_end($runs) AS d
 JOIN main.timer AS t ON d.timer_id = t.timer_id
 WHERE d.output_topic IN (SELECT topic_name FROM spoken)
     AND d.output_topic IN (SELECT topic_name FROM heard)
-    AND coalesce(d.run_ns <= 2 * d.publishing_run_ns, true)
+    AND coalesce(d.run_ns <= 10 * d.publishing_run_ns, true)
 QUALIFY t.period_ns = min(t.period_ns) OVER (PARTITION BY d.node_id, d.topic_name)

@@ -207,14 +207,13 @@ moving AS (
     SELECT
         p.what AS topic, p.path, p.path_ns, p.has_kernel, true AS is_traced, c.node,
         -- A thread that waits for a CPU, and not for work, is not known to have some: messages that
-        -- wait for others then seem to be on the way.
+        -- wait for others then seem to be on the way, unless their arrival is known.
         greatest(
             p.p95_ns - coalesce(
-                coalesce(c.cpu_ns, 0)
-                + CASE WHEN p.has_kernel THEN 0 ELSE c.own_ns + c.queued_ns END
-                + CASE WHEN p.p95_ns > 2 * c.period_ns AND NOT p.has_kernel
-                    THEN greatest(c.beside_ns, c.other_ns)
-                    ELSE greatest(c.beside_ns - c.other_ns, 0) END,
+                coalesce(c.cpu_ns, 0) + greatest(c.beside_ns - c.other_ns, 0)
+                + CASE WHEN p.part = 'until_arrival' THEN 0 ELSE c.own_ns + c.queued_ns END
+                + CASE WHEN p.part = 'until_arrival' OR p.p95_ns <= 2 * c.period_ns
+                    THEN 0 ELSE c.other_ns END,
                 0
             ),
             0
