@@ -1,8 +1,28 @@
 -- title: Timers that may use what their node was told before
--- description: Likely links that are not declared (main.dead_end), from messages that a node keeps
---     to timers of it.
+-- description: Links that may be missing (main.dead_end), from messages that a node keeps to timers
+--     of it; in a loop, too: what moves a robot is told where it is. Of several timers the fastest
+--     uses them: others tell how the node is. So does a timer whose messages nobody gets, or that
+--     publishes where other nodes do, too (/diagnostics). What runs for less than a tenth of the
+--     time that the callback of a message takes is not what uses it.
 -- grain: as main.dead_end
--- when: main.finding WHERE name = 'dead_end' AND list_contains($runs, run_id)
-SELECT node_id, timer_id, topic_name
-FROM main.dead_end($runs)
-WHERE is_likely AND timer_id IS NOT NULL
+-- when: main.timer WHERE node_id IN (SELECT node_id FROM main.subscription WHERE NOT is_internal)
+WITH spoken AS (
+    SELECT topic_name
+    FROM main.publisher
+    WHERE list_contains($runs, run_id)
+    GROUP BY topic_name
+    HAVING count(DISTINCT node_id) = 1
+),
+heard AS (
+    SELECT DISTINCT s.topic_name
+    FROM main.subscription AS s
+    SEMI JOIN main.take AS t ON s.subscription_id = t.subscription_id
+    WHERE list_contains($runs, s.run_id)
+)
+SELECT d.node_id, d.timer_id, d.topic_name
+FROM main.dead_end($runs) AS d
+JOIN main.timer AS t ON d.timer_id = t.timer_id
+WHERE d.output_topic IN (SELECT topic_name FROM spoken)
+    AND d.output_topic IN (SELECT topic_name FROM heard)
+    AND coalesce(d.run_ns <= 10 * d.publishing_run_ns, true)
+QUALIFY t.period_ns = min(t.period_ns) OVER (PARTITION BY d.node_id, d.topic_name)

@@ -37,7 +37,17 @@ traced AS (
 ),
 callback AS MATERIALIZED (
     SELECT
-        m.*,
+        -- Of no path more than all: callbacks also run for what is not on it.
+        m.* REPLACE (
+            m.cpu_ns - greatest(m.cpu_ns - p.path_ns, 0) AS cpu_ns,
+            least(m.call_ns, p.path_ns) AS call_ns,
+            least(m.other_ns, p.path_ns) AS other_ns, least(m.beside_ns, p.path_ns) AS beside_ns,
+            -- Further messages wait for what a callback waits for.
+            CASE WHEN m.call_ns <= m.computed_ns THEN least(m.own_ns, p.path_ns) ELSE 0 END
+                AS own_ns
+        ),
+        CASE WHEN m.call_ns > m.computed_ns THEN least(m.own_ns, p.path_ns) ELSE 0 END
+            AS queued_ns,
         p.path, p.p95_ns, p.path_ns, p.has_kernel,
         -- A callback may take up to most of its period, or 20 ms: a controller of 50 Hz notices.
         least(20_000_000, 0.8 * m.period_ns) AS limit_ns,
@@ -63,35 +73,30 @@ other AS (
         c.node, c.label, c.path, c.path_ns, c.limit_ns, c.has_kernel,
         greatest(c.other_ns, c.beside_ns) AS other_ns,
         -- The groups of callbacks are not in a trace: a thread may be free, and must not run them.
-        c.beside_ns > 2 * c.other_ns AS is_supposed,
+        c.beside_ns > 2 * c.other_ns AS is_supposed, c.other_run_ns,
         o.node AS other_node, o.label AS other_label, o.callback_id
     FROM callback AS c
     JOIN main.callback_label AS o ON c.other_id = o.callback_id
 ),
--- How long those run that keep others waiting.
+-- How long those run that keep others waiting, and the service that they wait for themselves.
 holding AS (
     SELECT
-        callback_id, quantile_disc(end_ns - start_ns, 0.5) AS usual_ns,
-        quantile_disc(end_ns - start_ns, 0.95) AS run_ns
-    FROM main.callback_instance
-    WHERE callback_id IN (SELECT callback_id FROM other)
-        AND start_ns >= $start_ns AND start_ns < $end_ns
-    GROUP BY callback_id
-),
-calling AS (
-    SELECT
-        c.path, c.path_ns, c.limit_ns, c.call_ns, c.node AS client, v.service_name,
-        main.node_label(n.full_name, r.name, r.pid) AS server,
-        (
-            SELECT quantile_disc(i.end_ns - i.start_ns, 0.5)
-            FROM main.callback AS k
-            JOIN main.callback_instance AS i ON k.callback_id = i.callback_id
-            WHERE k.service_id = c.service_id AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
-        ) AS served_ns
-    FROM callback AS c
-    JOIN main.service AS v ON c.service_id = v.service_id
-    JOIN main.process AS r ON v.process_id = r.process_id
-    LEFT JOIN main.node AS n ON v.node_id = n.node_id
+        i.callback_id, quantile_disc(i.end_ns - i.start_ns, 0.5) AS usual_ns,
+        quantile_disc(i.end_ns - i.start_ns, 0.95) AS run_ns,
+        arg_max(w.service_name, w.call_ns) AS service_name,
+        arg_max(coalesce(w.server, 'a server that is not recorded'), w.call_ns) AS server,
+        sum(w.call_ns) > 0.5 * sum(i.end_ns - i.start_ns) AS is_calling
+    FROM main.callback_instance AS i
+    LEFT JOIN (
+        SELECT
+            callback_instance_id, returned_ns - sent_ns AS call_ns, service_name, server
+        FROM main.waited_call
+        WHERE list_contains($runs, run_id)
+    ) AS w
+        ON i.callback_instance_id = w.callback_instance_id
+    WHERE i.callback_id IN (SELECT callback_id FROM other)
+        AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
+    GROUP BY i.callback_id
 ),
 -- Subscriptions with messages that failed, from the first that they took on.
 failing AS (
@@ -154,24 +159,37 @@ late AS (
     WHERE c.created_ns - c.usual_ns > greatest(2_000_000_000, 0.02 * c.length_ns)
         AND c.created_ns >= $asked_ns AND c.created_ns < $end_ns
 ),
+-- What timers may use, by all that their nodes keep and that comes more often.
+kept AS (
+    SELECT
+        n.full_name AS node, d.topic_name, t.period_ns,
+        string_agg(
+            printf('on %s every %s', d.topic_name, main.duration_text(c.period_ns::BIGINT)), ', '
+        ) OVER (
+            PARTITION BY d.timer_id ORDER BY d.topic_name
+            ROWS BETWEEN UNBOUNDED PRECEDING AND UNBOUNDED FOLLOWING
+        ) AS inputs
+    FROM open_end AS d
+    JOIN main.node AS n ON d.node_id = n.node_id
+    JOIN main.timer AS t ON d.timer_id = t.timer_id
+    JOIN why_callback AS c
+        ON n.full_name = c.node AND c.label = 'Subscription(' || d.topic_name || ')'
+    WHERE t.period_ns >= 2 * c.period_ns
+),
 sampled AS (
     SELECT
-        p.node, p.what, p.path, p.path_ns, p.p95_ns AS cost_ns, p.period_ns AS input_ns,
-        c.period_ns AS timer_ns, 'Messages' AS input, true AS is_declared
+        p.node, p.what, p.path, p.path_ns, p.p95_ns AS cost_ns, NULL AS inputs,
+        c.period_ns >= 2 * p.period_ns AND p.p95_ns >= 20_000_000 AS matters
     FROM place AS p
     JOIN callback AS c ON p.node = c.node AND p.what = c.label AND p.path = c.path
     WHERE p.part = 'cache'
     UNION ALL
     SELECT
-        n.full_name, printf('Timer(%.10g ms)', t.period_ns / 1e6), p.path, p.path_ns, t.period_ns,
-        c.period_ns, t.period_ns, d.topic_name, false
-    FROM open_end AS d
-    JOIN main.node AS n ON d.node_id = n.node_id
-    JOIN main.timer AS t ON d.timer_id = t.timer_id
+        k.node, printf('Timer(%.10g ms)', k.period_ns / 1e6), p.path, p.path_ns, k.period_ns,
+        k.inputs, k.period_ns >= 20_000_000
+    FROM kept AS k
     JOIN (SELECT DISTINCT path, path_ns FROM place) AS p
-        ON ends_with(p.path, ' → ' || d.topic_name || ' → ' || n.full_name)
-    JOIN why_callback AS c
-        ON n.full_name = c.node AND c.label = 'Subscription(' || d.topic_name || ')'
+        ON ends_with(p.path, ' → ' || k.topic_name || ' → ' || k.node)
 ),
 -- Executors of several threads that look for work again and again.
 awake AS (
@@ -187,8 +205,17 @@ awake AS (
 moving AS (
     SELECT
         p.what AS topic, p.path, p.path_ns, p.has_kernel, true AS is_traced, c.node,
+        -- A thread that waits for a CPU, and not for work, is not known to have some: messages that
+        -- wait for others then seem to be on the way, unless their arrival is known.
         greatest(
-            p.p95_ns - coalesce(c.cpu_ns, 0) - greatest(coalesce(c.beside_ns - c.other_ns, 0), 0), 0
+            p.p95_ns - coalesce(
+                coalesce(c.cpu_ns, 0) + greatest(c.beside_ns - c.other_ns, 0)
+                + CASE WHEN p.part = 'until_arrival' THEN 0 ELSE c.own_ns + c.queued_ns END
+                + CASE WHEN p.part = 'until_arrival' OR p.p95_ns <= 2 * c.period_ns
+                    THEN 0 ELSE c.other_ns END,
+                0
+            ),
+            0
         ) AS cost_ns
     FROM place AS p
     LEFT JOIN callback AS c
@@ -222,15 +249,21 @@ SELECT
 FROM computing
 UNION ALL
 SELECT
-    'executor', o.other_node, o.other_label, o.path, o.other_ns,
-    o.other_ns >= o.limit_ns AND o.other_ns >= 0.1 * o.path_ns,
-    printf(
-        'its callback %s (%s) keeps %s of %s waiting in their executor, for %s of %s',
-        o.other_label, main.duration_text(h.run_ns), o.label, o.node,
+    'executor', CASE WHEN h.is_calling THEN h.server ELSE o.other_node END, o.other_label, o.path,
+    o.other_ns, o.other_ns >= o.limit_ns AND o.other_ns >= 0.1 * o.path_ns,
+    CASE WHEN h.is_calling
+        THEN printf(
+            'its service %s, for which %s waits (%s),', h.service_name, o.other_label,
+            main.duration_text(h.run_ns)
+        )
+        ELSE printf('its callback %s (%s)', o.other_label, main.duration_text(h.run_ns))
+    END
+    || printf(
+        ' keeps %s of %s waiting in their executor, for %s of %s', o.label, o.node,
         main.duration_text(o.other_ns), main.duration_text(o.path_ns)
     )
     || CASE WHEN o.is_supposed THEN ', if one callback group has both' ELSE '' END
-    || CASE WHEN h.run_ns > 3 * h.usual_ns AND NOT o.has_kernel
+    || CASE WHEN greatest(h.run_ns, o.other_run_ns) > 3 * h.usual_ns AND NOT o.has_kernel
         THEN printf(
             '; usually it takes %s: it ran, or was kept from the CPU (not known without a kernel'
             || ' trace)',
@@ -257,14 +290,21 @@ FROM callback
 WHERE cpu_ns > 0
 UNION ALL
 SELECT
-    'service', server, service_name, path, call_ns,
+    'service', coalesce(server, 'a server that is not recorded'), service_name, path,
+    call_ns + queued_ns,
     call_ns >= limit_ns AND call_ns >= 0.1 * path_ns,
     printf(
-        'its service %s keeps a callback of %s waiting for %s of %s', service_name, client,
+        'its service %s keeps a callback of %s waiting for %s of %s', service_name, node,
         main.duration_text(call_ns), main.duration_text(path_ns)
     )
     || coalesce(printf(' (it answers in %s)', main.duration_text(served_ns)), '')
-FROM calling
+    || CASE WHEN is_recorded
+        THEN ''
+        ELSE ', as far as times show (requests are recorded since Kilted)' END
+    || CASE WHEN queued_ns > 0.2 * call_ns
+        THEN printf(', and further messages wait for that for %s', main.duration_text(queued_ns))
+        ELSE '' END
+FROM callback
 WHERE call_ns > 0
 UNION ALL
 SELECT
@@ -293,15 +333,14 @@ SELECT
 FROM late
 UNION ALL
 SELECT
-    'stale', node, what, path, cost_ns,
-    timer_ns >= 2 * input_ns AND cost_ns >= 20_000_000,
+    'stale', node, what, path, cost_ns, matters,
     printf('its %s uses what it was told before', what)
-    || CASE WHEN is_declared
+    || CASE WHEN inputs IS NULL
         THEN printf(': messages wait for it for %s of %s',
             main.duration_text(cost_ns), main.duration_text(path_ns))
-        ELSE printf(': messages on %s come every %s and wait for up to %s, if it uses them'
+        ELSE printf(': messages come %s and wait for up to %s, if it uses them'
             || ' (msgflow suggest links)',
-            input, main.duration_text(input_ns::BIGINT), main.duration_text(cost_ns))
+            inputs, main.duration_text(cost_ns))
     END
 FROM sampled
 UNION ALL

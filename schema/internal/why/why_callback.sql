@@ -13,11 +13,15 @@
 --     traced by the kernel
 -- column: cpu_by VARCHAR  What had it longest
 -- column: call_ns BIGINT [ns]  Calls of services for whose response it waited
--- column: service_id BIGINT  The service that it waited for longest
+-- column: service_name VARCHAR  The service that it waited for longest
+-- column: server VARCHAR  Node that offers it, or process in brackets; NULL: not in the trace
+-- column: served_ns BIGINT [ns]  Median time in which it answers; NULL: not known
+-- column: is_recorded BOOLEAN  Requests show it; else that its callback ran within this one
 -- column: own_ns BIGINT [ns]  Before it, its executor ran the callback for earlier messages
 -- column: other_ns BIGINT [ns]  Before it, its executor ran other callbacks, at most
 -- column: beside_ns BIGINT [ns]  Before it, one other callback ran, on whatever thread of its
 --     executor
+-- column: other_run_ns BIGINT [ns]  How long an instance of another callback took of that
 -- column: other_id BIGINT  The other callback that ran longest
 WITH chosen AS MATERIALIZED (
     SELECT callback_id, node, label
@@ -25,30 +29,74 @@ WITH chosen AS MATERIALIZED (
     WHERE list_contains($runs, run_id)
         AND (node, label) IN (SELECT (node, what) FROM breakdown)
 ),
+-- Releases before Kilted record no requests. Then a callback waits for a service if its process has
+-- a client of it, and nearly all that the service did happened in the callback.
+within AS (
+    SELECT
+        i.callback_instance_id, c.node, c.label, v.service_id, v.service_name, v.process_id,
+        v.node_id, j.end_ns - j.start_ns AS served_ns
+    FROM chosen AS c
+    JOIN main.callback_instance AS i ON c.callback_id = i.callback_id
+    JOIN main.client AS q ON i.process_id = q.process_id
+    JOIN main.service AS v ON q.run_id = v.run_id AND q.service_name = v.service_name
+    ANTI JOIN main.request AS r ON v.service_id = r.service_id
+    JOIN main.callback AS s ON v.service_id = s.service_id
+    JOIN main.callback_instance AS j
+        ON s.callback_id = j.callback_id AND i.start_ns < j.start_ns AND i.end_ns > j.end_ns
+),
+ran_at_all AS (
+    SELECT s.service_id, count(*) AS instances
+    FROM main.callback AS s
+    JOIN main.callback_instance AS j ON s.callback_id = j.callback_id
+    WHERE s.service_id IN (SELECT service_id FROM within)
+    GROUP BY s.service_id
+),
 call AS MATERIALIZED (
     SELECT
-        w.callback_instance_id, c.node, c.label, w.service_id,
-        sum(w.returned_ns - w.sent_ns)::BIGINT AS call_ns
+        w.callback_instance_id, c.node, c.label, w.service_name, w.server, w.served_ns,
+        w.returned_ns - w.sent_ns AS call_ns, true AS is_recorded
     FROM main.waited_call AS w
     JOIN main.callback_instance AS i ON w.callback_instance_id = i.callback_instance_id
     JOIN chosen AS c ON i.callback_id = c.callback_id
     WHERE list_contains($runs, w.run_id)
-    GROUP BY w.callback_instance_id, c.node, c.label, w.service_id
+    UNION ALL
+    SELECT
+        w.callback_instance_id, w.node, w.label, w.service_name,
+        main.node_label(n.full_name, r.name, r.pid), w.served_ns, w.served_ns, false
+    FROM within AS w
+    JOIN ran_at_all AS a ON w.service_id = a.service_id
+    JOIN main.process AS r ON w.process_id = r.process_id
+    LEFT JOIN main.node AS n ON w.node_id = n.node_id
+    QUALIFY count(*) OVER (PARTITION BY w.node, w.label, w.service_id) >= 0.9 * a.instances
 ),
 meanwhile AS (
     SELECT
         w.callback_instance_id, c.node, c.label,
         unnest(w.meanwhile_callback_ids) AS other_id,
-        unnest(w.meanwhile_ns) AS overlap_ns
+        unnest(w.meanwhile_ns) AS overlap_ns,
+        unnest(w.meanwhile_instances) AS instances
     FROM explained_wait AS w
     JOIN chosen AS c ON w.callback_id = c.callback_id
     WHERE w.start_ns >= $start_ns AND w.start_ns < $end_ns
 ),
+-- What took the CPU from a callback meanwhile is to blame for the rest, where the kernel shows it.
+computed AS (
+    SELECT
+        i.callback_id,
+        quantile_disc(i.end_ns - i.start_ns - s.preempted_ns - s.runnable_ns, 0.95) AS computed_ns
+    FROM main.callback_schedule AS s
+    JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
+    WHERE i.callback_id IN (SELECT other_id FROM meanwhile)
+        AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
+    GROUP BY i.callback_id
+),
 ran AS MATERIALIZED (
     SELECT
-        m.callback_instance_id, m.node, m.label, m.other_id, m.overlap_ns,
+        m.callback_instance_id, m.node, m.label, m.other_id,
+        least(m.overlap_ns, m.instances * p.computed_ns) AS overlap_ns, m.instances,
         o.callback_id IS NOT NULL AS is_own
     FROM meanwhile AS m
+    LEFT JOIN computed AS p ON m.other_id = p.callback_id
     LEFT JOIN chosen AS o
         ON m.other_id = o.callback_id AND m.node = o.node AND m.label = o.label
 ),
@@ -85,7 +133,8 @@ instance AS MATERIALIZED (
         least(
             greatest(w.busy_max_ns - coalesce(m.own_ns, 0), 0), coalesce(m.sum_ns, 0)
         ) AS other_ns,
-        coalesce(m.beside_ns, 0) AS beside_ns
+        coalesce(m.beside_ns, 0) AS beside_ns,
+        coalesce(m.other_run_ns, 0) AS other_run_ns
     FROM chosen AS c
     JOIN main.callback_instance AS i ON c.callback_id = i.callback_id
     LEFT JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
@@ -101,7 +150,8 @@ instance AS MATERIALIZED (
             callback_instance_id,
             sum(overlap_ns) FILTER (WHERE is_own)::BIGINT AS own_ns,
             sum(overlap_ns) FILTER (WHERE NOT is_own)::BIGINT AS sum_ns,
-            max(overlap_ns) FILTER (WHERE NOT is_own) AS beside_ns
+            max(overlap_ns) FILTER (WHERE NOT is_own) AS beside_ns,
+            max(overlap_ns // instances) FILTER (WHERE NOT is_own) AS other_run_ns
         FROM ran
         GROUP BY callback_instance_id
     ) AS m
@@ -119,13 +169,15 @@ measured AS (
         quantile_disc(call_ns, 0.95) AS call_ns,
         quantile_disc(own_ns, 0.95) AS own_ns,
         quantile_disc(other_ns, 0.95) AS other_ns,
-        quantile_disc(beside_ns, 0.95) AS beside_ns
+        quantile_disc(beside_ns, 0.95) AS beside_ns,
+        quantile_disc(other_run_ns, 0.95) AS other_run_ns
     FROM instance
     GROUP BY node, label
 )
 SELECT
     m.node, m.label, m.usual_ns, m.run_ns, m.period_ns, m.computed_ns, m.cpu_ns, t.cpu_by,
-    m.call_ns, q.service_id, m.own_ns, m.other_ns, m.beside_ns, o.other_id
+    m.call_ns, q.service_name, q.server, q.served_ns, q.is_recorded, m.own_ns, m.other_ns,
+    m.beside_ns, m.other_run_ns, o.other_id
 FROM measured AS m
 LEFT JOIN (
     SELECT node, label, arg_max(name, total_ns) AS cpu_by
@@ -142,13 +194,13 @@ LEFT JOIN (
 ) AS t
     ON m.node = t.node AND m.label = t.label
 LEFT JOIN (
-    SELECT node, label, arg_max(service_id, total_ns) AS service_id
-    FROM (
-        SELECT node, label, service_id, sum(call_ns) AS total_ns
-        FROM call
-        GROUP BY node, label, service_id
-    )
-    GROUP BY node, label
+    SELECT
+        node, label, service_name, server, is_recorded, quantile_disc(served_ns, 0.5) AS served_ns
+    FROM call
+    GROUP BY node, label, service_name, server, is_recorded
+    QUALIFY row_number() OVER (
+        PARTITION BY node, label ORDER BY sum(call_ns) DESC, service_name, server
+    ) = 1
 ) AS q
     ON m.node = q.node AND m.label = q.label
 LEFT JOIN (
