@@ -11,6 +11,7 @@ from typing import Any
 
 import duckdb
 from parsed_once import parsing_once
+from simple_plans import plan_simply
 from staged_events import StagedEvents
 
 from msgflow.db import objects
@@ -46,9 +47,7 @@ class Analysis:
         path = directory / "analysis.duckdb"
         shutil.copyfile(empty_database, path)
         self._connection = parsing_once(open_memory())
-        # Of a few rows, every order of joins is as good as the best: looking for it took a quarter.
-        self._connection.execute("SET threads = 1")
-        self._connection.execute("SET disabled_optimizers = 'join_order'")
+        plan_simply(self._connection)
         attach(self._connection, path)
         staging.attach(self._connection, None)
         self._tables = self._tables_of("raw"), self._tables_of("staging")
@@ -185,7 +184,8 @@ class Analysis:
         self._empty_store()
         con = self._connection
         raw, given = self._tables
-        for table in self._tables_of("staging") - given:
+        # An empty table is as the next model makes it.
+        for table in self._tables_of("staging", "estimated_size > 0") - given:
             con.execute(f"DROP TABLE staging.{table}")
         for view in self._views_of_staging() - self._views:
             con.execute(f"DROP VIEW staging.{view}")
