@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import re
 import shutil
 from collections.abc import Callable, Iterable
@@ -27,7 +28,7 @@ from msgflow.ingest.model import translate
 from msgflow.sql.header import Header
 
 _NAME = re.compile(r"(?:\b(staging|store|derive|main)\.)?\b([a-z_0-9]+)\b")
-_TEXT = re.compile(r"'(\w+)'")
+_TEXT = re.compile(r"'([\w%]+)'")
 _FINDING = "staging.finding"
 # What is stored of links and of what is missing comes of whole derivations.
 _DERIVED = frozenset(f"store.{name}" for name in derived_tables())
@@ -251,7 +252,8 @@ def _named(sql: str) -> frozenset[str]:
     if not re.search(r"\bfinding\b", sql):
         return frozenset()
     every = _of("input") | _of("recording")
-    found = every.intersection(_TEXT.findall(sql))
+    texts = [text.replace("%", "*") for text in _TEXT.findall(sql)]
+    found = {name for text in texts for name in fnmatch.filter(every, text)}
     return found | every.intersection(_TEXT.findall(statement(_headers(found))))
 
 
