@@ -58,12 +58,14 @@ def test_what_the_dead_spilled_is_removed(small_database: Path) -> None:
     assert (elsewhere.exists(), own.exists(), mine.exists()) == (False, True, True)
 
 
-def test_a_query_spills_beside_the_database_and_leaves_nothing(small_database: Path) -> None:
+def test_what_takes_more_than_memory_spills_beside_the_database(small_database: Path) -> None:
+    """Its answer is whole, and nothing is left."""
     before = set(os.listdir(small_database.parent))
     with msgflow.open_db(small_database, memory_limit="60MB") as database:
-        database.sql(
+        rows = database.sql(
             "SELECT count(*) AS n FROM (SELECT hash(range) AS h FROM range(4000000) ORDER BY h)"
         )
+        assert rows.to_arrow().to_pylist() == [{"n": 4_000_000}]
         inside = {*os.listdir(small_database.parent)} - before
         assert inside <= {spill_directory(small_database).name}
     assert set(os.listdir(small_database.parent)) == before

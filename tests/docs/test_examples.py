@@ -15,6 +15,7 @@ import pytest
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
+@cache
 def script() -> ModuleType:
     spec = importlib.util.spec_from_file_location("examples", DOCS / "examples.py")
     assert spec is not None

@@ -106,14 +106,6 @@ def test_an_error_is_in_the_line_that_its_author_counts(
     assert line[mark.index("^") : mark.index("^") + 7] == "nothing"
 
 
-def test_a_query_can_use_more_than_memory(small_database: Path) -> None:
-    with msgflow.open_db(small_database, memory_limit="60MB") as database:
-        rows = database.sql(
-            "SELECT count(*) AS n FROM (SELECT hash(range) AS h FROM range(4000000) ORDER BY h)"
-        )
-    assert rows.to_arrow().to_pylist() == [{"n": 4_000_000}]
-
-
 def test_what_needs_more_memory_than_it_may_take_says_so(small_database: Path) -> None:
     all_at_once = "SELECT len(list(range)) AS n FROM range(9000000)"
     with (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import re
 import shutil
 from collections.abc import Callable, Iterable
@@ -11,6 +12,7 @@ from typing import Any
 
 import duckdb
 from parsed_once import parsing_once
+from simple_plans import plan_simply
 from staged_events import StagedEvents
 
 from msgflow.db import objects
@@ -26,7 +28,7 @@ from msgflow.ingest.model import translate
 from msgflow.sql.header import Header
 
 _NAME = re.compile(r"(?:\b(staging|store|derive|main)\.)?\b([a-z_0-9]+)\b")
-_TEXT = re.compile(r"'(\w+)'")
+_TEXT = re.compile(r"'([\w%]+)'")
 _FINDING = "staging.finding"
 # What is stored of links and of what is missing comes of whole derivations.
 _DERIVED = frozenset(f"store.{name}" for name in derived_tables())
@@ -46,9 +48,7 @@ class Analysis:
         path = directory / "analysis.duckdb"
         shutil.copyfile(empty_database, path)
         self._connection = parsing_once(open_memory())
-        # Of a few rows, every order of joins is as good as the best: looking for it took a quarter.
-        self._connection.execute("SET threads = 1")
-        self._connection.execute("SET disabled_optimizers = 'join_order'")
+        plan_simply(self._connection)
         attach(self._connection, path)
         staging.attach(self._connection, None)
         self._tables = self._tables_of("raw"), self._tables_of("staging")
@@ -185,7 +185,8 @@ class Analysis:
         self._empty_store()
         con = self._connection
         raw, given = self._tables
-        for table in self._tables_of("staging") - given:
+        # An empty table is as the next model makes it.
+        for table in self._tables_of("staging", "estimated_size > 0") - given:
             con.execute(f"DROP TABLE staging.{table}")
         for view in self._views_of_staging() - self._views:
             con.execute(f"DROP VIEW staging.{view}")
@@ -251,7 +252,8 @@ def _named(sql: str) -> frozenset[str]:
     if not re.search(r"\bfinding\b", sql):
         return frozenset()
     every = _of("input") | _of("recording")
-    found = every.intersection(_TEXT.findall(sql))
+    texts = [text.replace("%", "*") for text in _TEXT.findall(sql)]
+    found = {name for text in texts for name in fnmatch.filter(every, text)}
     return found | every.intersection(_TEXT.findall(statement(_headers(found))))
 
 

@@ -36,10 +36,16 @@ class Ingested:
 
     def differences(self, expected: str, actual: str) -> tuple[list[Any], list[Any]]:
         """Return (missing, extra) rows of the query `actual`, the first few of each."""
-        few = "ORDER BY ALL LIMIT 5"
+        found = self.rows(
+            f"WITH expected AS MATERIALIZED ({expected}), actual AS MATERIALIZED ({actual}) "
+            "SELECT true, * FROM "
+            "(FROM expected EXCEPT ALL FROM actual ORDER BY ALL LIMIT 5) "
+            "UNION ALL SELECT false, * FROM "
+            "(FROM actual EXCEPT ALL FROM expected ORDER BY ALL LIMIT 5)"
+        )
         return (
-            self.rows(f"({expected}) EXCEPT ALL ({actual}) {few}"),
-            self.rows(f"({actual}) EXCEPT ALL ({expected}) {few}"),
+            [row for is_missing, *row in found if is_missing],
+            [row for is_missing, *row in found if not is_missing],
         )
 
 

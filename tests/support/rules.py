@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 
 import duckdb
+from simple_plans import plan_simply
 
 from msgflow.db import objects
 
@@ -56,8 +57,8 @@ def _as_made(*statements: str) -> Iterator[duckdb.DuckDBPyConnection]:
 
 @cache
 def _made(statements: tuple[str, ...]) -> duckdb.DuckDBPyConnection:
-    # Of a few rows, there is nothing to share out.
-    con = duckdb.connect(config={"threads": 1})
+    con = duckdb.connect()
+    plan_simply(con)
     for statement in statements:
         con.execute(statement)
     return con

@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from contextlib import chdir
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,6 +15,7 @@ from typing import Any
 
 import pyarrow as pa
 import pytest
+from same_windows import require_same_as_whole
 from thorough import few
 from typer.testing import CliRunner, Result
 
@@ -29,6 +31,7 @@ from msgflow.watch.chunk import Chunk
 from msgflow.watch.flight_recorder import FlightRecorder
 from msgflow.watch.kept_chunk import read_chunk
 from msgflow.watch.kept_traces import KeptTraces
+from msgflow.watch.window_report import WindowReport
 from msgflow_sim import Recording, simulate
 
 SECOND = 1_000_000_000
@@ -53,27 +56,44 @@ def watched(shared_traces: Path, tmp_path: Path):
     return run
 
 
-def test_a_violation_names_the_culprit_and_is_kept(watched, tmp_path: Path) -> None:
-    """A window of three seconds: in the other ones nothing took so long."""
-    kept = tmp_path / "kept"
-    others_own = [kept / "violation-19700101-000000" / "msgflow.duckdb", kept / "violation-report"]
-    for file in others_own:
+@pytest.fixture(scope="module")
+def violated(
+    shared_traces: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[list[dict[str, Any]], str, Path]:
+    """Windows of three seconds, what is said beside them, and where violations are kept.
+
+    What violates the targets in the first one is told once.
+    """
+    place = tmp_path_factory.mktemp("violated")
+    kept = place / "kept"
+    for file in others_own(kept):
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text("matters")
-    options = ("--window", "3s", "--step", "3s", "--json", "--keep-most", 1)
     between = "  - {from: /scan, to: /filtered, latency: max < 80 ms}\n"
-    result = watched(f"{TARGETS}{between}", *options, "--keep-on-violation", kept)
+    (place / "targets.yaml").write_text(f"{TARGETS}{between}")
+    words = ["watch", shared_traces / "real_rotate", "--once", "--json"]
+    words += ["--window", "3s", "--step", "3s", "--late", "3s"]
+    words += ["--targets", place / "targets.yaml", "--keep-most", 1, "--keep-on-violation", kept]
+    result = CliRunner().invoke(app, [str(word) for word in words])
     assert result.exit_code == 1
-    # What this program did not write stays.
-    assert all(file.read_text() == "matters" for file in others_own)
-    first, *others = map(json.loads, result.stdout.splitlines())
+    return [json.loads(line) for line in result.stdout.splitlines()], result.stderr, kept
+
+
+def others_own(kept: Path) -> tuple[Path, Path]:
+    """Return files that this program did not write."""
+    return kept / "violation-19700101-000000" / "msgflow.duckdb", kept / "violation-report"
+
+
+def test_a_violation_names_the_culprit_and_is_kept(violated) -> None:
+    (first, *others), said_beside, kept = violated
+    assert all(file.read_text() == "matters" for file in others_own(kept))
     subjects = [violation["subject"] for violation in first["violations"]]
     assert subjects == ["/scan → /filtered", "/scan → /filtered → /sink"]
     for violation in first["violations"]:
         assert violation["worst_ns"] == 99_343_279
         assert "/filter ran 48.084 ms" in violation["culprit"]
     # The first sentence of `why` on that window.
-    said = "/filter: its callback Subscription(/scan) takes 46.9 ms of 70.2 ms"
+    said = "/filter: its callback Subscription(/scan) takes 48.1 ms of 78 ms"
     assert first["violations"][0]["why"].startswith(said)
     assert not any(window["violations"] for window in others)
     (directory,) = kept.glob("violation-2*")
@@ -81,7 +101,20 @@ def test_a_violation_names_the_culprit_and_is_kept(watched, tmp_path: Path) -> N
     with Database(directory / "msgflow.duckdb") as database:
         rows = database.query("e2e-latency").to_arrow().to_pylist()
         assert max(row["max_ns"] or 0 for row in rows) == violation["worst_ns"]
-    assert f"kept: msgflow why --db {directory}" in result.stderr
+    assert f"kept: msgflow why --db {directory}" in said_beside
+
+
+def test_its_windows_have_the_numbers_of_the_whole(violated, real: Callable[[str], Path]) -> None:
+    """It lost 12 events in its fourth chunk, which is no reason to call a border a gap."""
+    names = ("paths", "executors", "losses", "topics", "discarded_events")
+    found = [
+        WindowReport(
+            window=Window(line["start_ns"], line["end_ns"]), **{name: line[name] for name in names}
+        )
+        for line in violated[0]
+    ]
+    require_same_as_whole(found, real("real_rotate"))
+    assert sum(report.discarded_events for report in found) == 12
 
 
 @pytest.mark.thorough

@@ -11,11 +11,11 @@ from collections import Counter
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 from unittest.mock import Mock
 
 import duckdb
 import pytest
+from same_windows import by_path, require_equal, require_same_as_whole
 from thorough import few, thorough
 
 from msgflow.cli.show.window_line import window_line
@@ -48,7 +48,6 @@ from msgflow_sim import (
 
 MS = 1_000_000
 SECOND = 1_000_000_000
-Row = dict[str, Any]
 
 
 def reports(
@@ -74,66 +73,6 @@ def watching(
         clocks=read_clock_sync(clocks),
         note=notes.append,
     )
-
-
-def asked(database: Database, query: str, report: WindowReport) -> list[Row]:
-    window = report.window
-    result = database.query(query, start=window.start_ns, end=window.end_ns)
-    return result.to_arrow().to_pylist()
-
-
-def by_path(rows: list[Row]) -> dict[str, Row]:
-    """Return the rows of paths with roots: others say that nothing happened."""
-    return {row["path"]: row for row in rows if row["roots"]}
-
-
-def require_equal(database: Database, report: WindowReport) -> None:
-    expected = by_path(asked(database, "e2e-latency", report))
-    found = by_path(list(report.paths))
-    assert found == {
-        path: {name: row[name] for name in found[path]} for path, row in expected.items()
-    }
-    executors = asked(database, "executor-usage", report)
-    assert Counter((row["tid"], row["callbacks"], row["callback_ns"]) for row in executors) == (
-        Counter((row["tid"], row["callbacks"], row["callback_ns"]) for row in report.executors)
-    )
-    topics = {row["topic_name"]: row for row in asked(database, "topics-summary", report)}
-    for shown in report.topics:
-        row = topics[shown["topic"]] | {"topic": shown["topic"]}
-        assert shown == {name: row[name] for name in shown}
-    losses = asked(database, "topics-delivery", report)
-    assert [(row["topic"], row["dropped"], row["lost"]) for row in report.losses] == [
-        (row["topic_name"], row["dropped"], row["lost"])
-        for row in losses
-        if row["dropped"] or row["lost"]
-    ]
-
-
-def require_same_as_whole(directory: Path, database: Path, length: float) -> list[WindowReport]:
-    """Require that each window has the numbers of the whole, and each root is counted once.
-
-    Args:
-        directory: a recording.
-        database: one of its ingest as a whole.
-        length: of a window, in seconds.
-    """
-    found = reports(directory, window=length, step=length)
-    assert len(found) > 2
-    roots: Counter[str] = Counter()
-    with Database(database) as whole:
-        for report in found:
-            require_equal(whole, report)
-            roots.update({row["path"]: row["roots"] for row in report.paths})
-        rows = whole.query("e2e-latency").to_arrow().to_pylist()
-    assert +roots == Counter({row["path"]: row["roots"] for row in rows if row["roots"]})
-    return found
-
-
-def test_a_real_recording(shared_traces: Path, real: Callable[[str], Path]) -> None:
-    """It lost 12 events in its fourth chunk, which is no reason to call a border a gap."""
-    directory = shared_traces / "real_rotate"
-    found = require_same_as_whole(directory, real("real_rotate"), 3)
-    assert sum(report.discarded_events for report in found) == 12
 
 
 @pytest.fixture(scope="module")
@@ -183,7 +122,8 @@ def test_an_interrupt_does_not_wait_for_a_backlog(
 @pytest.mark.thorough
 def test_a_simulated_recording(simulated: Path, tmp_path: Path) -> None:
     ingest([simulated], tmp_path / "whole.duckdb")
-    require_same_as_whole(simulated, tmp_path / "whole.duckdb", 0.5)
+    found = reports(simulated, window=0.5, step=0.5)
+    require_same_as_whole(found, tmp_path / "whole.duckdb")
 
 
 @pytest.mark.thorough
