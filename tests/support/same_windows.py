@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from msgflow.database import Database
-from msgflow.watch import WindowReport
+from msgflow.watch.window_report import WindowReport
 
 Row = dict[str, Any]
 
