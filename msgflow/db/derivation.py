@@ -42,28 +42,25 @@ def derive(
             derive_table(con, name, run_id)
     if synchronise is not None:
         synchronise()
-    _derive_on_clocks(con, run_id)
-    if findings:
-        derive_findings(con, run_id)
+    derive_from_clocks(con, run_id, findings=findings)
     con.execute(
         "UPDATE store.run SET derivation_hash = ? WHERE run_id = ?",
         [derivation_hash(), run_id],
     )
 
 
-def derive_from_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
+def derive_from_clocks(
+    con: duckdb.DuckDBPyConnection, run_id: int, *, findings: bool = True
+) -> None:
     """Derive anew what depends on corrected clocks, and all findings of the recording.
 
     This happens inside the open transaction.
     """
-    _derive_on_clocks(con, run_id)
-    derive_findings(con, run_id)
-
-
-def _derive_on_clocks(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     for name in derived_tables():
         if reads_clocks(name):
             derive_table(con, name, run_id)
+    if findings:
+        derive_findings(con, run_id)
 
 
 def derive_findings(con: duckdb.DuckDBPyConnection, run_id: int) -> None:

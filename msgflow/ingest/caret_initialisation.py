@@ -34,7 +34,12 @@ def restore(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
 
     It tells whether there were any.
     """
-    reported, moved = _reported(), _moved()
+    known, moved = load().tracepoints, _initialisations(_UNDER_ITS_NAME)
+    reported = [
+        (again, known[_FIRST + again.event])
+        for again in _initialisations(_AGAIN)
+        if _FIRST + again.event in known
+    ]
     tables = [f"raw.{each.table}" for each in (*(again for again, _ in reported), *moved)]
     if all(table in empty for table in tables):
         return False
@@ -53,23 +58,13 @@ def restore(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
     return True
 
 
-def _reported() -> list[tuple[Tracepoint, Tracepoint]]:
-    tracepoints = load().tracepoints
-    return [
-        (tracepoint, tracepoints[_FIRST + tracepoint.event])
-        for name, tracepoint in tracepoints.items()
-        if name.startswith(_AGAIN)
-        and tracepoint.is_staged
-        and _FIRST + tracepoint.event in tracepoints
-        and any(field.name == "init_timestamp" for field in tracepoint.fields)
-    ]
-
-
-def _moved() -> list[Tracepoint]:
+def _initialisations(prefix: str) -> list[Tracepoint]:
+    """Return the tracepoints that say when an object was initialised."""
     return [
         tracepoint
         for name, tracepoint in load().tracepoints.items()
-        if name.startswith(_UNDER_ITS_NAME)
+        if name.startswith(prefix)
+        and tracepoint.is_staged
         and any(field.name == "init_timestamp" for field in tracepoint.fields)
     ]
 

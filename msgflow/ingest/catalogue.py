@@ -105,11 +105,6 @@ class Tracepoint:
     interrupt: str | None = None  # the kind of interrupt that begins or ends
 
     @property
-    def provider(self) -> str:
-        """The part before the colon, empty for events of the kernel."""
-        return self.name.rpartition(":")[0]
-
-    @property
     def event(self) -> str:
         """The part after the colon."""
         return self.name.rpartition(":")[2]

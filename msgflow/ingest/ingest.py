@@ -24,7 +24,7 @@ from msgflow.db.workspace import creating, workspace
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.ingest import model, refusals, staging
 from msgflow.ingest.hostnames import hostnames_of
-from msgflow.ingest.load import Loaded, load_traces
+from msgflow.ingest.load import load_traces
 from msgflow.ingest.samples import load_samples
 from msgflow.ingest.stored_run import fallback_name, require_free_name, store_run
 from msgflow.links import declare_links, read_links
@@ -112,7 +112,12 @@ def ingest(
     quarter of that of the machine, at least 500 MB and at most 4 GB. `traces` are what to read, if
     they were opened before; `paths` only give the run its name then.
     """
-    _require_usable(paths, name)
+    if "" in paths:
+        raise UsageError(
+            "the path of a trace is empty", "msgflow ingest TRACE, or . for the current directory"
+        )
+    if name is not None:
+        require_run_name(name)
     declared = read_links(links) if isinstance(links, Path) else links
     clocks = read_clock_sync(clock_sync)
     if database.is_symlink():
@@ -151,7 +156,7 @@ def ingest(
                 shut_in(con, directories=written, lock=False)
                 watch.enter("reading the traces")
                 with staging.writing(con):
-                    loaded = load_traces(
+                    replaced = load_traces(
                         con,
                         traces,
                         hostnames=hostnames,
@@ -170,16 +175,16 @@ def ingest(
                         workspace=directory,
                         interrupts=interrupts,
                     )
-                refusals.require_ros_events(traces.traces, loaded.event_counts, traces.damages)
+                refusals.require_ros_events(traces.traces, traces.event_counts, traces.damages)
                 names = (name, fallback_name(paths))
-                event_count = sum(loaded.event_counts.values())
+                event_count = sum(traces.event_counts.values())
                 run = interruptible(
                     con,
                     lambda: _write(
                         con,
                         target,
                         names,
-                        loaded,
+                        replaced,
                         (declared, clocks),
                         keep_staging,
                         watch,
@@ -213,7 +218,7 @@ def _write(
     con: duckdb.DuckDBPyConnection,
     target: _Target,
     names: tuple[str | None, str],
-    loaded: Loaded,
+    replaced: frozenset[int],
     given: tuple[LinksFile | None, ClockSync],
     keep_staging: Path | None,
     watch: _Watch,
@@ -230,7 +235,7 @@ def _write(
         staging.export(con, keep_staging)
     with transaction(con):
         watch.enter("storing the run")
-        run_id, run_name = store_run(con, *names, loaded)
+        run_id, run_name = store_run(con, *names, replaced)
         watch.enter("linking messages")
         declared, clocks = given
         if declared is not None:
@@ -239,15 +244,6 @@ def _write(
         findings = tuple(read_findings(con, [run_id], info=True))
         interrupts.make_final()
     return run_id, run_name, findings
-
-
-def _require_usable(paths: Sequence[str | Path], name: str | None) -> None:
-    if "" in paths:
-        raise UsageError(
-            "the path of a trace is empty", "msgflow ingest TRACE, or . for the current directory"
-        )
-    if name is not None:
-        require_run_name(name)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ import contextlib
 import itertools
 import time
 from collections import Counter
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -40,15 +39,6 @@ _LONGEST_NAME = 1 << 10
 _LONGEST_SYMBOL = 1 << 16
 
 
-@dataclass(frozen=True)
-class Loaded:
-    """What was loaded."""
-
-    # (trace index, event name) -> events read, wanted or not.
-    event_counts: Mapping[tuple[int, str], int]
-    replaced_runs: frozenset[int]  # ids of the runs that hold some of these packets already
-
-
 def load_traces(
     con: duckdb.DuckDBPyConnection,
     traces: TraceSet,
@@ -60,8 +50,8 @@ def load_traces(
     replace: bool,
     interrupts: Interrupts,
     progress: Callable[[Progress, float], None] | None,
-) -> Loaded:
-    """Load all wanted events and all packets of `traces`.
+) -> frozenset[int]:
+    """Load all wanted events and packets; return the runs that hold some of these packets already.
 
     `may_hold` says that the current database may hold some of these packets already; `replace`,
     that this is no error. `interrupts` is asked at every batch. `progress` gets the progress of the
@@ -124,7 +114,7 @@ def load_traces(
     if traces.duplicate_packet_count:
         _insert(con, "packet_read_once", [(None, traces.duplicate_packet_count)])
     _insert(con, "packet_read_once", traces.repeated_packet_counts.items())
-    return Loaded(dict(traces.event_counts), frozenset(tables.replaced))
+    return frozenset(tables.replaced)
 
 
 def _insert(con: duckdb.DuckDBPyConnection, table: str, rows: Iterable[Sequence[object]]) -> None:

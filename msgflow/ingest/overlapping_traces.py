@@ -94,7 +94,10 @@ def corrections_of(con: duckdb.DuckDBPyConnection) -> Corrections:
             _create(con, made, f"VIEW session_event AS {statements().header('session_event').body}")
             for table in ("session_pair", "session_container", "duplicate_event"):
                 _make(con, made, table)
-            duplicates = _duplicates(con)
+            counts = statements().header("duplicate_count").body
+            con.execute(f"INSERT INTO staging.left_out\n{counts}")
+            found = con.execute("SELECT event_id FROM duplicate_event ORDER BY ALL").fetchnumpy()
+            duplicates = np.asarray(found["event_id"], np.int64)
         else:
             _create(con, made, "TABLE session_container (session BIGINT, container BIGINT)")
         # A thread that gets its name back has had three.
@@ -125,16 +128,6 @@ def corrections_of(con: duckdb.DuckDBPyConnection) -> Corrections:
         sessions,
         names,
     )
-
-
-def _duplicates(con: duckdb.DuckDBPyConnection) -> NDArray[np.int64]:
-    """Return the ids of events that another trace holds as well, in order.
-
-    Their counts go to `staging.left_out`.
-    """
-    con.execute("INSERT INTO staging.left_out\n" + statements().header("duplicate_count").body)
-    found = con.execute("SELECT event_id FROM duplicate_event ORDER BY ALL").fetchnumpy()
-    return np.asarray(found["event_id"], np.int64)
 
 
 def _make(con: duckdb.DuckDBPyConnection, made: ExitStack, table: str) -> None:

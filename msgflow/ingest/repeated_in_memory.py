@@ -68,7 +68,7 @@ def ingest_again(
     with noted_interrupts() as interrupts:
         empty(con, "target")
         try:
-            loaded = load_traces(
+            load_traces(
                 con,
                 traces,
                 hostnames={},
@@ -80,7 +80,7 @@ def ingest_again(
             )
             model.build(con, keep=True, findings=False)
             with transaction(con):
-                run_id, _ = store_run(con, name, name, loaded)
+                run_id, _ = store_run(con, name, name)
                 _derive(con, run_id, links, clocks, leave_out)
         finally:
             empty(con, "raw", "staging")

@@ -16,15 +16,16 @@ from msgflow.trace import archive
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Sequence, Set
 
     import duckdb
 
-    from msgflow.ingest.load import Loaded
-
 
 def store_run(
-    con: duckdb.DuckDBPyConnection, name: str | None, fallback: str, loaded: Loaded
+    con: duckdb.DuckDBPyConnection,
+    name: str | None,
+    fallback: str,
+    replaced: Set[int] = frozenset(),
 ) -> tuple[int, str]:
     """Store a run from staging, inside the open transaction, in place of those that it replaces.
 
@@ -32,10 +33,9 @@ def store_run(
     behind it if another run has that name. Its id and name are returned.
     """
     run_id = int(con.execute("SELECT coalesce(max(run_id), 0) + 1 FROM store.run").fetchall()[0][0])
-    replaced = set(loaded.replaced_runs)
     if name is not None:
         named = con.execute("SELECT run_id FROM store.run WHERE name = ?", [name]).fetchall()
-        replaced |= {number for (number,) in named}
+        replaced = replaced | {number for (number,) in named}
     store(con, run_id)
     delete(con, sorted(replaced))
     run_name = name or free_name(con, fallback)

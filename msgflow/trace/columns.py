@@ -21,13 +21,6 @@ LABELS = b"labels"
 """Key of a field's metadata: of an enumeration, each label with its ranges of values, as JSON."""
 
 
-def names_of(field: pa.Field) -> tuple[str, ...]:
-    """Return the names under which a trace may have this field, the preferred one first."""
-    metadata = field.metadata or {}
-    aliases = metadata.get(ALIASES, b"").decode()
-    return (field.name, *(alias for alias in aliases.split(",") if alias))
-
-
 def field_metadata(
     base: int | None, labels: Mapping[str, Iterable[tuple[int, int]]] | None
 ) -> dict[bytes, bytes]:
@@ -113,7 +106,9 @@ def paths_of(
     types = {field.name: field.type for field in fields}
     found: list[tuple[tuple[str, ...], ...]] = []
     for column in columns:
-        wanted, names = _plain(column.type), names_of(column)
+        wanted = _plain(column.type)
+        aliases = (column.metadata or {}).get(ALIASES, b"").decode()
+        names = (column.name, *filter(None, aliases.split(",")))
         plain = next((name for name in names if _can_hold(wanted, types.get(name))), None)
         if plain is not None:
             found.append(((plain,),))

@@ -109,7 +109,7 @@ def test_pointers_are_unsigned_and_times_signed() -> None:
 
 def test_parts_of_a_name() -> None:
     tracepoint = catalogue.load().tracepoints["ros2_caret:dds_write"]
-    assert (tracepoint.provider, tracepoint.event) == ("ros2_caret", "dds_write")
+    assert tracepoint.event == "dds_write"
     assert tracepoint.table == "ros2_caret_dds_write"
     assert [field.name for field in tracepoint.fields] == ["message"]
 
@@ -174,7 +174,7 @@ def test_everything_that_is_staged_is_read() -> None:
     """By a step of the model or of what comes before it, or as initialisation reported again."""
     known = catalogue.load()
     # `caret_initialisation` puts these into the tables of those of ROS 2.
-    again = {f"ros2_caret_{t.event}" for t in known.staged.values() if t.provider == "ros2"}
+    again = {f"ros2_caret_{t.event}" for t in known.staged.values() if t.name.startswith("ros2:")}
     text = "\n".join(
         path.read_text(encoding="utf-8")
         for path in resource_directory("schema").rglob("*.sql")

@@ -175,8 +175,7 @@ def _row(packet: PacketEvents, report: Callable[[Entry, int, str], None]) -> tup
         report(entry, 0, "time runs backward in the packet")
     if packet.first is not None and packet.first < entry.begin:
         report(entry, 0, "an event is earlier than the begin of its packet")
-    clock = stream.layout.stream.clock
-    assert clock is not None
+    clock = stream.layout.clock
     end_ns = None
     if header.end is not None:
         # A crash leaves packets without an end; old tracers give one before the last event.

@@ -142,9 +142,7 @@ def _load(
         events = read_events(layout, memory, of_layout)
         events = without_absurd(layout, of_layout, events, report_once)
         parts.append(events)
-        clock = layout.stream.clock
-        assert clock is not None
-        times.append(clock.to_ns_array(events.clock))
+        times.append(layout.clock.to_ns_array(events.clock))
     counts = np.concatenate([part.counts for part in parts])
     ts_ns = _joined(times)
     return _Loaded(
@@ -298,14 +296,13 @@ def cut(
     memory = loader.alone(entry)
     if memory is None:
         return None
-    layout, clock_class = entry.stream.layout, entry.stream.layout.stream.clock
-    assert clock_class is not None
+    layout = entry.stream.layout
     entry.base = 0
     find_events(layout, memory, [entry], report)
     events = read_events(layout, memory, [entry])
     is_sound = without_absurd(layout, [entry], events, say_nothing) is events
     entry.base = -1
-    ts_ns = clock_class.to_ns_array(events.clock)
+    ts_ns = layout.clock.to_ns_array(events.clock)
     begins = events.positions
     if not (is_sound and begins.size and (ts_ns[1:] >= ts_ns[:-1]).all()):
         return None

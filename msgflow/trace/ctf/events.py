@@ -89,9 +89,7 @@ def without_absurd(
 
     `report` is called with the packet, the byte of the first of them, and a message.
     """
-    clock = layout.stream.clock
-    assert clock is not None
-    limits = np.array([_limits(entry, clock) for entry in entries], np.uint64).reshape(-1, 2)
+    limits = np.array([_limits(entry, layout.clock) for entry in entries], np.uint64).reshape(-1, 2)
     filled = np.flatnonzero(events.counts)
     if not filled.size:
         return events

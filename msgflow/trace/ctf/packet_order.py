@@ -92,13 +92,12 @@ def entries_of(
     """
     candidates = []
     for stream in streams:
-        clock = stream.layout.stream.clock
         for packet in stream.packets:
             if packet in begins:
                 begin, order_ns = begins[packet]
             else:
                 begin = packet.header.begin or 0
-                order_ns = clock.to_ns(begin) if clock is not None else begin
+                order_ns = stream.layout.clock.to_ns(begin)
             candidates.append((order_ns, stream.rank, begin, stream, packet))
     candidates.sort(key=lambda candidate: candidate[:2])
 
@@ -201,8 +200,7 @@ def begins_of(stream: Stream) -> dict[Packet, tuple[int, int]]:
     """
     if all(packet.header.begin is not None for packet in stream.packets):
         return {}
-    clock_class = stream.layout.stream.clock
-    assert clock_class is not None
+    clock_class = stream.layout.clock
     begins = {}
     clock = 0
     order_ns = clock_class.to_ns(0)

@@ -16,6 +16,7 @@ from msgflow.trace.ctf.field_types import BYTE, FieldError, Type, aligned, parts
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from msgflow.trace.ctf.clock import Clock
     from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
 
 GAP = 64
@@ -79,6 +80,12 @@ class StreamLayout:
             for number, (event_id, event) in enumerate(stream.events.items(), first_number)
         }
 
+    @property
+    def clock(self) -> Clock:
+        """The clock of the stream class; traces in which one has none are refused, or given one."""
+        assert self.stream.clock is not None
+        return self.stream.clock
+
     def span(self, base: int, events_at: int, content_bits: int) -> Span:
         """Return where events lie in a packet at the byte `base`; needs `header`."""
         align = self.known_header.align * BYTE
@@ -104,18 +111,19 @@ class StreamLayout:
         For each residue of the event's position, a dictionary from the selector, shifted as it
         lies in its word, to the size. Events whose size varies are not in it.
         """
-        header = self.known_header
+        header, selector = self.known_header, self.known_header.selector
         sizes: list[dict[int, int]] = [{} for _ in range(self.residues)]
         for event_id, layout in self.classes.items():
-            form = self._short_form(event_id)
-            if form is None or layout.body.sizes is None:
+            form = self._form_of(event_id)
+            is_short = form is not None and form.id == selector and 0 <= event_id <= selector.mask
+            if form is None or not is_short or layout.body.sizes is None:
                 continue
             for residue, of_residue in enumerate(sizes):
                 body_at = residue + form.sizes[residue]
                 end = body_at + layout.body.sizes[body_at % self.residues]
                 size = aligned(end, header.align) - residue
                 if size:
-                    of_residue[event_id << header.selector.shift] = size
+                    of_residue[event_id << selector.shift] = size
         return sizes
 
     @cached_property
@@ -139,21 +147,9 @@ class StreamLayout:
                 table[selector, residue] = size
         return table
 
-    def _short_form(self, event_id: int) -> Form | None:
-        """Return the form whose selector is this id, None if no form is."""
-        selector = self.known_header.selector
-        for form in self.known_header.forms:
-            if form.holds(event_id):
-                is_short = form.id == selector and 0 <= event_id <= selector.mask
-                return form if is_short else None
-        return None
-
-    def form_of(self, selector: int) -> Form:
+    def _form_of(self, selector: int) -> Form | None:
         """Return the form of a header with this selector."""
-        for form in self.known_header.forms:
-            if form.holds(selector):
-                return form
-        raise FieldError(f"there is no form of an event header for {selector}")
+        return next((form for form in self.known_header.forms if form.holds(selector)), None)
 
     def next_event(self, data: bytearray, position: int, span: Span) -> int:
         """Return where the event after the one at this byte begins."""
@@ -163,7 +159,9 @@ class StreamLayout:
         key = selector * self.residues + residue
         found = self._short_forms.get(key)
         if found is None:
-            form = self.form_of(selector)
+            form = self._form_of(selector)
+            if form is None:
+                raise FieldError(f"there is no form of an event header for {selector}")
             event_id = form.id.read(data, position, residue) if form.id else self.only_id
             layout = self.classes.get(event_id)
             if layout is None:

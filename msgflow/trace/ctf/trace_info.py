@@ -52,8 +52,7 @@ def describe(trace: TraceClass, path: Path, index: int, streams: Sequence[Stream
 
 
 def _range(stream: Stream) -> tuple[int | None, int | None]:
-    clock = stream.layout.stream.clock
-    assert clock is not None
+    clock = stream.layout.clock
     begins = [p.header.begin for p in stream.packets if p.header.begin is not None]
     ends = [p.header.end for p in stream.packets if p.header.end is not None]
     if ends:
