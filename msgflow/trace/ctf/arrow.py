@@ -8,18 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from msgflow.trace.columns import field_metadata
-from msgflow.trace.ctf.field_types import (
-    Array,
-    Integer,
-    Optional,
-    Real,
-    Sequence,
-    String,
-    Structure,
-    Type,
-    VariableInteger,
-    Variant,
-)
+from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.numpy_arrow import to_arrow
 
 if TYPE_CHECKING:
@@ -29,33 +18,33 @@ _UNSIGNED = {8: pa.uint8(), 16: pa.uint16(), 32: pa.uint32(), 64: pa.uint64()}
 _SIGNED = {8: pa.int8(), 16: pa.int16(), 32: pa.int32(), 64: pa.int64()}
 
 
-def arrow_type(declared: Type) -> pa.DataType:
+def arrow_type(declared: ctf.Type) -> pa.DataType:
     """Return the Arrow type; a variant is a structure of all its options, all but one NULL."""
     match declared:
-        case Integer():
+        case ctf.Integer():
             if declared.arrow == "bool":
                 return pa.bool_()
             if declared.arrow == "bits":
                 return pa.uint64()
             types = _SIGNED if declared.signed else _UNSIGNED
             return types[next(size for size in types if size >= declared.size)]
-        case VariableInteger():
+        case ctf.VariableInteger():
             return pa.int64() if declared.signed else pa.uint64()
-        case Real():
+        case ctf.Real():
             return pa.float32() if declared.size == 32 else pa.float64()
-        case String():
+        case ctf.String():
             return pa.string()
-        case Array() | Sequence():
+        case ctf.Array() | ctf.Sequence():
             return pa.string() if declared.is_text else pa.list_(arrow_type(declared.element))
-        case Structure():
+        case ctf.Structure():
             return pa.struct([(m.name, arrow_type(m.type)) for m in declared.members])
-        case Variant():
+        case ctf.Variant():
             return pa.struct([(c.name, arrow_type(c.type)) for c in declared.choices])
-        case Optional():
+        case ctf.Optional():
             return arrow_type(declared.content)
 
 
-def declared_schema(structure: Structure) -> pa.Schema:
+def declared_schema(structure: ctf.Structure) -> pa.Schema:
     """Return the columns of a payload, one for each field, with their bases and labels."""
     return pa.schema(
         [
@@ -69,10 +58,10 @@ def declared_schema(structure: Structure) -> pa.Schema:
     )
 
 
-def _base(declared: Type) -> int | None:
-    if isinstance(declared, Array | Sequence):
+def _base(declared: ctf.Type) -> int | None:
+    if isinstance(declared, ctf.Array | ctf.Sequence):
         return _base(declared.element)
-    return declared.base if isinstance(declared, Integer) else None
+    return declared.base if isinstance(declared, ctf.Integer) else None
 
 
 def number_array(values: NDArray[Any], data_type: pa.DataType) -> pa.Array:

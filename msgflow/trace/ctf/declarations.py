@@ -4,19 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.clock import Clock
-from msgflow.trace.ctf.field_types import (
-    Array,
-    Choice,
-    Integer,
-    Member,
-    MetadataError,
-    Role,
-    Structure,
-    Type,
-    VariableInteger,
-    Variant,
-)
+from msgflow.trace.ctf.field_types import MetadataError, Role
 
 _SMALLEST_ID, _LARGEST_ID = -(1 << 63), (1 << 64) - 1
 _TIMES = {Role.TIME, Role.END}
@@ -28,8 +18,8 @@ class EventClass:
 
     id: int
     name: str
-    specific_context: Structure = field(default_factory=Structure)
-    payload: Structure = field(default_factory=Structure)
+    specific_context: ctf.Structure = field(default_factory=ctf.Structure)
+    payload: ctf.Structure = field(default_factory=ctf.Structure)
 
 
 @dataclass(eq=False)
@@ -37,9 +27,9 @@ class StreamClass:
     """One kind of stream (LTTng: channel) and its events."""
 
     id: int
-    packet_context: Structure = field(default_factory=Structure)
-    event_header: Structure = field(default_factory=Structure)
-    event_context: Structure = field(default_factory=Structure)
+    packet_context: ctf.Structure = field(default_factory=ctf.Structure)
+    event_header: ctf.Structure = field(default_factory=ctf.Structure)
+    event_context: ctf.Structure = field(default_factory=ctf.Structure)
     clock: Clock | None = None
     events: dict[int, EventClass] = field(default_factory=dict)
     has_time: bool = True  # its events have times; if not, `clock` only counts packets
@@ -51,7 +41,7 @@ class TraceClass:
 
     uuid: str | None = None
     environment: dict[str, int | str] = field(default_factory=dict)
-    packet_header: Structure = field(default_factory=Structure)
+    packet_header: ctf.Structure = field(default_factory=ctf.Structure)
     streams: dict[int, StreamClass] = field(default_factory=dict)
     # Messages about declarations left out because they make no sense.
     notes: list[str] = field(default_factory=list)
@@ -78,19 +68,19 @@ def give_order(stream: StreamClass) -> None:
     stream.event_header = _structure(stream.event_header)
 
 
-def _structure(declared: Structure) -> Structure:
-    members = tuple(Member(member.name, _type(member.type)) for member in declared.members)
-    return Structure(members, declared.minimum_align)
+def _structure(declared: ctf.Structure) -> ctf.Structure:
+    members = tuple(ctf.Member(member.name, _type(member.type)) for member in declared.members)
+    return ctf.Structure(members, declared.minimum_align)
 
 
-def _type(declared: Type) -> Type:
+def _type(declared: ctf.Type) -> ctf.Type:
     match declared:
-        case Structure():
+        case ctf.Structure():
             return _structure(declared)
-        case Variant():
-            choices = (Choice(c.name, _type(c.type), c.ranges) for c in declared.choices)
+        case ctf.Variant():
+            choices = (ctf.Choice(c.name, _type(c.type), c.ranges) for c in declared.choices)
             return replace(declared, choices=tuple(choices))
-        case Integer() | VariableInteger() | Array():
+        case ctf.Integer() | ctf.VariableInteger() | ctf.Array():
             return replace(declared, roles=declared.roles - _TIMES)
         case _:
             return declared

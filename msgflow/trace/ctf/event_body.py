@@ -7,19 +7,8 @@ from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
-from msgflow.trace.ctf.field_types import (
-    BYTE,
-    Array,
-    FieldError,
-    Integer,
-    Real,
-    Scope,
-    Sequence,
-    String,
-    Structure,
-    Type,
-    Variant,
-)
+from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.field_types import BYTE, FieldError, Scope
 from msgflow.trace.ctf.layout import (
     DynamicError,
     VariantLayout,
@@ -61,7 +50,7 @@ class PlainField:
     count: int = 1  # of the elements of an array, otherwise 1
     length_at: int = -1  # for a sequence, the place in the list of the field with its length
     is_length: bool = False  # it is the length of a sequence, or chooses the option of the variant
-    type: Type | None = None  # as declared
+    type: ctf.Type | None = None  # as declared
 
     @property
     def size(self) -> int | None:
@@ -149,9 +138,9 @@ def compile_body(stream: StreamClass, event: EventClass, residues: int) -> Event
     }
     sizes = _sizes(list(structures.values()), residues)
     last = event.payload.members[-1] if event.payload.members else None
-    variant = last.type if last is not None and isinstance(last.type, Variant) else None
+    variant = last.type if last is not None and isinstance(last.type, ctf.Variant) else None
     if variant is not None:
-        before = Structure(event.payload.members[:-1], event.payload.align)
+        before = ctf.Structure(event.payload.members[:-1], event.payload.align)
         structures[Scope.PAYLOAD] = before
     fields: list[PlainField] | None = []
     for scope, structure in structures.items():
@@ -165,7 +154,7 @@ def compile_body(stream: StreamClass, event: EventClass, residues: int) -> Event
     return EventBody(None if fields is None else tuple(fields), sizes, offsets)
 
 
-def _with_variant(fields: list[PlainField], variant: Variant, name: str) -> EventBody:
+def _with_variant(fields: list[PlainField], variant: ctf.Variant, name: str) -> EventBody:
     reference, layout = variant.selector, lay_out_variant(variant)
     for number, field in enumerate(fields):
         if (
@@ -181,7 +170,7 @@ def _with_variant(fields: list[PlainField], variant: Variant, name: str) -> Even
     return EventBody(None, None, None)
 
 
-def _sizes(structures: list[Structure], residues: int) -> tuple[int, ...] | None:
+def _sizes(structures: list[ctf.Structure], residues: int) -> tuple[int, ...] | None:
     sizes = []
     for residue in range(residues):
         end = residue * BYTE
@@ -206,7 +195,7 @@ def _offsets(fields: list[PlainField], residue: int) -> list[int]:
 
 
 def _add_fields(
-    fields: list[PlainField], scope: Scope, structure: Structure
+    fields: list[PlainField], scope: Scope, structure: ctf.Structure
 ) -> list[PlainField] | None:
     fields = list(fields)
     if structure.align > 1:
@@ -223,23 +212,25 @@ def _add_fields(
     return fields
 
 
-def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) -> PlainField | None:
+def _plain(
+    fields: list[PlainField], scope: Scope, name: str, declared: ctf.Type
+) -> PlainField | None:
     # Every plain field ends on a whole byte: a smaller alignment changes nothing behind it.
     align = max(declared.align // BYTE, 1)
     kind, count, length_at, element = Kind.NUMBER, 1, -1, declared
     match declared:
-        case String():
+        case ctf.String():
             return PlainField(scope, name, Kind.STRING, align, type=declared)
-        case Array():
+        case ctf.Array():
             kind = Kind.TEXT if declared.is_text else Kind.NUMBERS
             count, element = declared.length, declared.element
-        case Sequence():
+        case ctf.Sequence():
             kind = Kind.TEXT_SEQUENCE if declared.is_text else Kind.SEQUENCE
             found, element = _length_field(fields, scope, declared), declared.element
             if found is None:
                 return None
             length_at = found
-    if not isinstance(element, Integer | Real) or element.size not in _WIDTHS:
+    if not isinstance(element, ctf.Integer | ctf.Real) or element.size not in _WIDTHS:
         return None
     if element is not declared and not is_dense(element):
         return None
@@ -247,7 +238,7 @@ def _plain(fields: list[PlainField], scope: Scope, name: str, declared: Type) ->
     return PlainField(scope, name, kind, align, dtype, width, count, length_at, type=declared)
 
 
-def _length_field(fields: list[PlainField], scope: Scope, declared: Sequence) -> int | None:
+def _length_field(fields: list[PlainField], scope: Scope, declared: ctf.Sequence) -> int | None:
     """Return the place of the field with the length, None if no plain field before has it."""
     reference = declared.length
     if len(reference.path) != 1:
@@ -256,6 +247,6 @@ def _length_field(fields: list[PlainField], scope: Scope, declared: Sequence) ->
     for number in range(len(fields) - 1, -1, -1):
         field = fields[number]
         if field.name == reference.path[0] and field.scope in scopes:
-            is_unsigned = isinstance(field.type, Integer) and not field.type.signed
+            is_unsigned = isinstance(field.type, ctf.Integer) and not field.type.signed
             return number if field.kind is Kind.NUMBER and is_unsigned else None
     return None

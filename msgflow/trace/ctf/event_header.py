@@ -11,16 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from msgflow.trace.ctf.field_types import (
-    BYTE,
-    Choice,
-    Integer,
-    Role,
-    Scope,
-    Structure,
-    Type,
-    Variant,
-)
+from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.field_types import BYTE, Role, Scope
 from msgflow.trace.ctf.layout import DynamicError, Leaf, lay_out
 
 if TYPE_CHECKING:
@@ -65,7 +57,7 @@ class Place:
 class Form:
     """One form of the header."""
 
-    choice: Choice | None  # for which selector values; None: always
+    choice: ctf.Choice | None  # for which selector values; None: always
     id: Place | None  # where the event's class is; None if there is only one
     time: Place | None  # where the time stamp is; None without one
     sizes: tuple[int, ...]  # of the header in bytes, by residue
@@ -91,7 +83,7 @@ class EventHeader:
         return max(size for form in self.forms for size in form.sizes)
 
 
-def compile_header(structure: Structure, residues: int) -> EventHeader | None:
+def compile_header(structure: ctf.Structure, residues: int) -> EventHeader | None:
     """Compile the layout of headers; None if they must be read field by field.
 
     `residues` is as for `compile_body`.
@@ -99,13 +91,13 @@ def compile_header(structure: Structure, residues: int) -> EventHeader | None:
     if structure.align % BYTE or not structure.members:
         return None
     last = structure.members[-1].type
-    choices: Sequence[Choice | None] = [None]
-    if isinstance(last, Variant):
+    choices: Sequence[ctf.Choice | None] = [None]
+    if isinstance(last, ctf.Variant):
         choices = last.choices
     try:
         forms = [_form(structure, choice, residues) for choice in choices]
         selector = forms[0].id
-        if isinstance(last, Variant):
+        if isinstance(last, ctf.Variant):
             path = last.selector.path
             if last.selector.scope not in {None, Scope.EVENT_HEADER} or len(path) != 1:
                 return None
@@ -122,18 +114,20 @@ def compile_header(structure: Structure, residues: int) -> EventHeader | None:
     )
 
 
-def _leaves(structure: Structure, choice: Choice | None, residue: int) -> tuple[list[Leaf], int]:
+def _leaves(
+    structure: ctf.Structure, choice: ctf.Choice | None, residue: int
+) -> tuple[list[Leaf], int]:
     leaves: list[Leaf] = []
     position = residue * BYTE
     for member in structure.members:
-        declared: Type = member.type
-        if isinstance(declared, Variant) and choice is not None:
+        declared: ctf.Type = member.type
+        if isinstance(declared, ctf.Variant) and choice is not None:
             declared = choice.type
         position = lay_out(declared, position, leaves, (member.name,))
     return leaves, position
 
 
-def _form(structure: Structure, choice: Choice | None, residues: int) -> Form:
+def _form(structure: ctf.Structure, choice: ctf.Choice | None, residues: int) -> Form:
     laid_out = [_leaves(structure, choice, residue) for residue in range(residues)]
     sizes = []
     for residue, (_, end) in enumerate(laid_out):
@@ -152,7 +146,7 @@ def _last_of_role(laid_out: tuple[list[Leaf], int], role: str) -> Leaf | None:
     of_role = (
         leaf
         for leaf in reversed(laid_out[0])
-        if isinstance(leaf.type, Integer) and role in leaf.type.roles
+        if isinstance(leaf.type, ctf.Integer) and role in leaf.type.roles
     )
     return next(of_role, None)
 
@@ -164,7 +158,7 @@ def _place(leaves: Sequence[Leaf | None]) -> Place | None:
     for residue, leaf in enumerate(leaves):
         if leaf is None:
             return None
-        if not isinstance(leaf.type, Integer) or leaf.type.signed:
+        if not isinstance(leaf.type, ctf.Integer) or leaf.type.signed:
             raise DynamicError
         size, big_endian = leaf.type.size, leaf.type.big_endian
         first = leaf.position // BYTE

@@ -5,24 +5,8 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING, Any
 
-from msgflow.trace.ctf.field_types import (
-    BYTE,
-    Array,
-    FieldError,
-    Integer,
-    Optional,
-    Real,
-    Reference,
-    Role,
-    Scope,
-    Sequence,
-    String,
-    Structure,
-    Type,
-    VariableInteger,
-    Variant,
-    aligned,
-)
+from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.field_types import BYTE, FieldError, Reference, Role, Scope, aligned
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -48,18 +32,18 @@ class FieldReader:
         self._frames: list[dict[str, Any]] = []
         self._empty_elements = 0
         self._readers: dict[type, Callable[[Any], Any]] = {
-            Integer: self._integer,
-            VariableInteger: self._variable_integer,
-            Real: self._real,
-            String: self._string,
-            Array: self._array,
-            Sequence: self._sequence,
-            Structure: self._structure,
-            Variant: self._variant,
-            Optional: self._optional,
+            ctf.Integer: self._integer,
+            ctf.VariableInteger: self._variable_integer,
+            ctf.Real: self._real,
+            ctf.String: self._string,
+            ctf.Array: self._array,
+            ctf.Sequence: self._sequence,
+            ctf.Structure: self._structure,
+            ctf.Variant: self._variant,
+            ctf.Optional: self._optional,
         }
 
-    def read_scope(self, scope: Scope, structure: Structure) -> dict[str, Any]:
+    def read_scope(self, scope: Scope, structure: ctf.Structure) -> dict[str, Any]:
         """Read one of the structures of a packet or event."""
         if scope is Scope.EVENT_HEADER:
             self._empty_elements = 0
@@ -71,7 +55,7 @@ class FieldReader:
         self._fill(structure, values)
         return values
 
-    def _read(self, field_type: Type) -> Any:
+    def _read(self, field_type: ctf.Type) -> Any:
         return self._readers[type(field_type)](field_type)
 
     def _take(self, size: int, align: int = 1) -> int:
@@ -91,7 +75,7 @@ class FieldReader:
             return int.from_bytes(content, "big") >> shift & ((1 << size) - 1)
         return int.from_bytes(content, "little") >> (begin - first * BYTE) & ((1 << size) - 1)
 
-    def _integer(self, field_type: Integer) -> int | bool:
+    def _integer(self, field_type: ctf.Integer) -> int | bool:
         size = field_type.size
         value = self._bits(size, field_type.align, field_type.big_endian)
         if field_type.signed and value >> (size - 1):
@@ -100,7 +84,7 @@ class FieldReader:
             self.found[role], self.bits[role] = value, size
         return bool(value) if field_type.arrow == "bool" else value
 
-    def _variable_integer(self, field_type: VariableInteger) -> int:
+    def _variable_integer(self, field_type: ctf.VariableInteger) -> int:
         value = 0
         for number in range(_MOST_VARIABLE_BYTES):
             byte = self._bits(BYTE, BYTE, False)
@@ -115,12 +99,12 @@ class FieldReader:
             self.found[role], self.bits[role] = value, 64
         return value
 
-    def _real(self, field_type: Real) -> float:
+    def _real(self, field_type: ctf.Real) -> float:
         bits = self._bits(field_type.size, field_type.align, field_type.big_endian)
         codes = ("<I", "<f") if field_type.size == 32 else ("<Q", "<d")
         return float(struct.unpack(codes[1], struct.pack(codes[0], bits))[0])
 
-    def _string(self, field_type: String) -> str:
+    def _string(self, field_type: ctf.String) -> str:
         begin = self._take(0, field_type.align) // BYTE
         end = self._end // BYTE
         size = _USUAL_TEXT
@@ -136,16 +120,16 @@ class FieldReader:
         self.position = (begin + length + 1) * BYTE
         return content[:length].decode("utf-8", "replace")
 
-    def _array(self, field_type: Array) -> Any:
+    def _array(self, field_type: ctf.Array) -> Any:
         return self._elements(field_type, field_type.length)
 
-    def _sequence(self, field_type: Sequence) -> Any:
+    def _sequence(self, field_type: ctf.Sequence) -> Any:
         length = self._look_up(field_type.length)
         if not isinstance(length, int) or length < 0:
             raise FieldError("the length of a sequence is no length")
         return self._elements(field_type, length)
 
-    def _elements(self, field_type: Array | Sequence, length: int) -> Any:
+    def _elements(self, field_type: ctf.Array | ctf.Sequence, length: int) -> Any:
         element = field_type.element
         begin = self._take(0, field_type.align)
         smallest = _smallest_size(element)
@@ -157,7 +141,7 @@ class FieldReader:
             self._empty_elements += length
         if length > room:
             raise FieldError(f"{length} elements do not fit into the packet")
-        roles = field_type.roles if isinstance(field_type, Array) else ()
+        roles = field_type.roles if isinstance(field_type, ctf.Array) else ()
         if not roles and not field_type.is_text:
             return [self._read(element) for _ in range(length)]
         self.position = begin + length * BYTE
@@ -168,17 +152,17 @@ class FieldReader:
         self.found |= dict.fromkeys(roles, content)
         return list(content)
 
-    def _structure(self, field_type: Structure) -> dict[str, Any]:
+    def _structure(self, field_type: ctf.Structure) -> dict[str, Any]:
         values: dict[str, Any] = {}
         self._fill(field_type, values)
         return values
 
-    def _fill(self, field_type: Structure, values: dict[str, Any]) -> None:
+    def _fill(self, field_type: ctf.Structure, values: dict[str, Any]) -> None:
         """Read a structure into `values`, in which later members look up lengths and selectors."""
         self._take(0, field_type.align)
         self._frames.append(values)
         for member in field_type.members:
-            if isinstance(member.type, Structure):
+            if isinstance(member.type, ctf.Structure):
                 inner: dict[str, Any] = {}
                 values[member.name] = inner
                 self._fill(member.type, inner)
@@ -186,14 +170,14 @@ class FieldReader:
                 values[member.name] = self._read(member.type)
         self._frames.pop()
 
-    def _variant(self, field_type: Variant) -> dict[str, Any]:
+    def _variant(self, field_type: ctf.Variant) -> dict[str, Any]:
         value = self._look_up(field_type.selector)
         for choice in field_type.choices:
             if choice.holds(value):
                 return {choice.name: self._read(choice.type)}
         raise FieldError(f"a variant has no option for the value {value}")
 
-    def _optional(self, field_type: Optional) -> Any:
+    def _optional(self, field_type: ctf.Optional) -> Any:
         value = self._look_up(field_type.selector)
         if any(first <= value <= last for first, last in field_type.ranges):
             return self._read(field_type.content)
@@ -237,16 +221,16 @@ def _member_of(value: Any, name: str | None) -> Any:
     return None
 
 
-def _smallest_size(field_type: Type) -> int:
+def _smallest_size(field_type: ctf.Type) -> int:
     """Return the fewest bits that a field of this type takes."""
     match field_type:
-        case Integer(size=size) | Real(size=size):
+        case ctf.Integer(size=size) | ctf.Real(size=size):
             return size
-        case String() | VariableInteger():
+        case ctf.String() | ctf.VariableInteger():
             return BYTE
-        case Array(element=element, length=length):
+        case ctf.Array(element=element, length=length):
             return length * _smallest_size(element)
-        case Structure(members=members):
+        case ctf.Structure(members=members):
             return sum(_smallest_size(member.type) for member in members)
         case _:
             return 0

@@ -8,27 +8,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 from uuid import UUID
 
+from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
-from msgflow.trace.ctf.field_types import (
-    BYTE,
-    Array,
-    Choice,
-    Integer,
-    Member,
-    MetadataError,
-    Optional,
-    Real,
-    Reference,
-    Scope,
-    Sequence,
-    String,
-    Structure,
-    Type,
-    VariableInteger,
-    Variant,
-    may_have,
-)
+from msgflow.trace.ctf.field_types import BYTE, MetadataError, Reference, Scope, may_have
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -56,8 +39,8 @@ _INTEGERS = {
     "fixed-length-bit-map": "bits",
 }
 _BIT_ORDERS = {False: "first-to-last", True: "last-to-first"}
-_CHARACTER = Integer(BYTE, BYTE, False, is_text=True)
-_BYTE = Integer(BYTE, BYTE, False)
+_CHARACTER = ctf.Integer(BYTE, BYTE, False, is_text=True)
+_BYTE = ctf.Integer(BYTE, BYTE, False)
 _TRUE = ((1, (1 << 64) - 1),)
 _MOST_BITS = 64
 _MOST_ALIGN = 1 << 20
@@ -189,22 +172,22 @@ class TypeReader:
     """Reader of field classes and their aliases."""
 
     def __init__(self) -> None:
-        self._aliases: dict[str, Type] = {}
+        self._aliases: dict[str, ctf.Type] = {}
 
     def add_alias(self, fragment: dict[str, Any]) -> None:
         """Learn a name for a field class."""
         self._aliases[str(fragment.get("name"))] = self._type(fragment.get("field-class"))
 
-    def structure(self, fragment: dict[str, Any], key: str) -> Structure:
+    def structure(self, fragment: dict[str, Any], key: str) -> ctf.Structure:
         """Return the structure under `key`, an empty one if there is none."""
         if key not in fragment:
-            return Structure()
+            return ctf.Structure()
         declared = self._type(fragment[key])
-        if not isinstance(declared, Structure):
+        if not isinstance(declared, ctf.Structure):
             raise MetadataError(f"`{key}` is no structure")
         return declared
 
-    def _type(self, declared: Any) -> Type:
+    def _type(self, declared: Any) -> ctf.Type:
         if isinstance(declared, str) and declared in self._aliases:
             return self._aliases[declared]
         if not isinstance(declared, dict):
@@ -215,35 +198,35 @@ class TypeReader:
             case _ if kind in _INTEGERS:
                 return _integer(declared, kind)
             case "variable-length-unsigned-integer" | "variable-length-signed-integer":
-                integer = VariableInteger("unsigned" not in kind, _labels(declared))
+                integer = ctf.VariableInteger("unsigned" not in kind, _labels(declared))
                 return replace(integer, roles=_roles(declared, integer))
             case "fixed-length-floating-point-number":
                 size = integer_of(declared, "length", None)
                 if size not in {32, 64}:
                     raise MetadataError("a floating point number must have 32 or 64 bits")
-                return Real(size, _align(declared, "alignment"), _is_big_endian(declared))
+                return ctf.Real(size, _align(declared, "alignment"), _is_big_endian(declared))
             case "null-terminated-string":
                 _check_encoding(declared)
-                return String()
+                return ctf.String()
             case "static-length-string":
                 _check_encoding(declared)
-                return Array(_CHARACTER, _length(declared))
+                return ctf.Array(_CHARACTER, _length(declared))
             case "dynamic-length-string":
                 _check_encoding(declared)
-                return Sequence(_CHARACTER, _reference(declared, "length-field-location"))
+                return ctf.Sequence(_CHARACTER, _reference(declared, "length-field-location"))
             case "static-length-blob":
-                blob = Array(_BYTE, _length(declared))
+                blob = ctf.Array(_BYTE, _length(declared))
                 return replace(blob, roles=_roles(declared, blob))
             case "dynamic-length-blob":
-                return Sequence(_BYTE, _reference(declared, "length-field-location"))
+                return ctf.Sequence(_BYTE, _reference(declared, "length-field-location"))
             case "static-length-array":
-                return Array(
+                return ctf.Array(
                     self._type(declared.get("element-field-class")),
                     _length(declared),
                     _align(declared, "minimum-alignment"),
                 )
             case "dynamic-length-array":
-                return Sequence(
+                return ctf.Sequence(
                     self._type(declared.get("element-field-class")),
                     _reference(declared, "length-field-location"),
                     _align(declared, "minimum-alignment"),
@@ -253,7 +236,7 @@ class TypeReader:
             case "variant":
                 return self._variant(declared)
             case "optional":
-                return Optional(
+                return ctf.Optional(
                     _reference(declared, "selector-field-location"),
                     self._type(declared.get("field-class")),
                     _ranges(declared.get("selector-field-ranges"))
@@ -263,23 +246,23 @@ class TypeReader:
             case _:
                 raise MetadataError(f"unknown field class {declared.get('type')!r}")
 
-    def _structure(self, declared: dict[str, Any]) -> Structure:
+    def _structure(self, declared: dict[str, Any]) -> ctf.Structure:
         members = [
-            Member(str(member.get("name")), self._type(member.get("field-class")))
+            ctf.Member(str(member.get("name")), self._type(member.get("field-class")))
             for member in _objects(declared, "member-classes")
         ]
-        return Structure(tuple(members), _align(declared, "minimum-alignment"))
+        return ctf.Structure(tuple(members), _align(declared, "minimum-alignment"))
 
-    def _variant(self, declared: dict[str, Any]) -> Variant:
+    def _variant(self, declared: dict[str, Any]) -> ctf.Variant:
         choices = [
-            Choice(
+            ctf.Choice(
                 str(option.get("name") or f"option_{index}"),
                 self._type(option.get("field-class")),
                 _ranges(option.get("selector-field-ranges")),
             )
             for index, option in enumerate(_objects(declared, "options"))
         ]
-        return Variant(_reference(declared, "selector-field-location"), tuple(choices))
+        return ctf.Variant(_reference(declared, "selector-field-location"), tuple(choices))
 
 
 def integer_of(declared: dict[str, Any], key: str, default: int | None) -> int:
@@ -290,11 +273,11 @@ def integer_of(declared: dict[str, Any], key: str, default: int | None) -> int:
     return value
 
 
-def _integer(declared: dict[str, Any], kind: str) -> Integer:
+def _integer(declared: dict[str, Any], kind: str) -> ctf.Integer:
     size = integer_of(declared, "length", None)
     if not 1 <= size <= _MOST_BITS:
         raise MetadataError(f"an integer of {size} bits makes no sense")
-    integer = Integer(
+    integer = ctf.Integer(
         size=size,
         align=_align(declared, "alignment"),
         big_endian=_is_big_endian(declared),
@@ -347,7 +330,7 @@ def _ranges(declared: Any) -> Ranges:
     return ranges
 
 
-def _roles(declared: dict[str, Any], of_type: Type) -> frozenset[str]:
+def _roles(declared: dict[str, Any], of_type: ctf.Type) -> frozenset[str]:
     roles = declared.get("roles", [])
     if not isinstance(roles, list):
         raise MetadataError(f"{roles!r} is no list of roles")

@@ -11,22 +11,12 @@ import itertools
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeGuard
 
-from msgflow.trace.ctf.field_types import (
-    BYTE,
-    Array,
-    FieldError,
-    Integer,
-    Real,
-    Structure,
-    Type,
-    Variant,
-    aligned,
-)
+from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.field_types import BYTE, FieldError, aligned
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from msgflow.trace.ctf.field_types import Choice
 
 _MOST_STEPS = 100_000
 _WIDTHS = {8, 16, 32, 64}
@@ -41,12 +31,12 @@ class Leaf:
     """A number, or an array of numbers that follow each other without gaps."""
 
     path: tuple[str, ...]  # names of the members from the outermost to this one
-    type: Integer | Real | Array
+    type: ctf.Integer | ctf.Real | ctf.Array
     position: int  # in bits
 
 
 def lay_out(
-    declared: Type,
+    declared: ctf.Type,
     position: int,
     leaves: list[Leaf] | None = None,
     path: tuple[str, ...] = (),
@@ -61,26 +51,26 @@ def lay_out(
     # Arrays inside arrays may have more elements than a loop can count.
     steps = itertools.count(1)
 
-    def end(declared: Type, position: int, path: tuple[str, ...]) -> int:
+    def end(declared: ctf.Type, position: int, path: tuple[str, ...]) -> int:
         if next(steps) > _MOST_STEPS:
             raise DynamicError
         position = aligned(position, declared.align)
         match declared:
-            case Integer() | Real():
+            case ctf.Integer() | ctf.Real():
                 if leaves is not None:
                     leaves.append(Leaf(path, declared, position))
                 return position + declared.size
-            case Array() if is_dense(declared.element):
+            case ctf.Array() if is_dense(declared.element):
                 if leaves is not None:
                     leaves.append(Leaf(path, declared, position))
                 return position + declared.length * declared.element.size
-            case Array():
+            case ctf.Array():
                 if declared.length > _MOST_STEPS:
                     raise DynamicError
                 for number in range(declared.length):
                     position = end(declared.element, position, (*path, str(number)))
                 return position
-            case Structure():
+            case ctf.Structure():
                 for member in declared.members:
                     position = end(member.type, position, (*path, member.name))
                 return position
@@ -90,9 +80,9 @@ def lay_out(
     return end(declared, position, path)
 
 
-def is_dense(element: Type) -> TypeGuard[Integer | Real]:
+def is_dense(element: ctf.Type) -> TypeGuard[ctf.Integer | ctf.Real]:
     """Tell whether elements of this type follow each other without gaps."""
-    return isinstance(element, Integer | Real) and element.size % element.align == 0
+    return isinstance(element, ctf.Integer | ctf.Real) and element.size % element.align == 0
 
 
 @dataclass(frozen=True)
@@ -121,7 +111,7 @@ class OptionLayout:
 class VariantLayout:
     """The options of a variant."""
 
-    options: tuple[tuple[Choice, OptionLayout], ...]  # declaration and layout of each option
+    options: tuple[tuple[ctf.Choice, OptionLayout], ...]  # declaration and layout of each option
     _chosen: dict[int, OptionLayout] = field(default_factory=dict, compare=False, repr=False)
 
     def option(self, value: int) -> OptionLayout:
@@ -163,11 +153,11 @@ class VariantLayout:
             )
 
 
-def lay_out_variant(variant: Variant) -> VariantLayout | None:
+def lay_out_variant(variant: ctf.Variant) -> VariantLayout | None:
     """Compile the layout of a variant; None if an option is no structure of fixed size."""
     options = []
     for choice in variant.choices:
-        if not isinstance(choice.type, Structure):
+        if not isinstance(choice.type, ctf.Structure):
             return None
         option = _lay_out_option(choice.type)
         if option is None:
@@ -176,19 +166,19 @@ def lay_out_variant(variant: Variant) -> VariantLayout | None:
     return VariantLayout(tuple(options))
 
 
-def is_selector(declared: Type) -> bool:
+def is_selector(declared: ctf.Type) -> bool:
     """Tell whether a field of this type can be a selector: an unsigned integer of whole bytes."""
-    return isinstance(declared, Integer) and not declared.signed and _is_whole(declared)
+    return isinstance(declared, ctf.Integer) and not declared.signed and _is_whole(declared)
 
 
-def _lay_out_option(structure: Structure) -> OptionLayout | None:
+def _lay_out_option(structure: ctf.Structure) -> OptionLayout | None:
     members = structure.members
     last = members[-1] if members else None
-    variant = last.type if last is not None and isinstance(last.type, Variant) else None
+    variant = last.type if last is not None and isinstance(last.type, ctf.Variant) else None
     fixed = members if variant is None else members[:-1]
     leaves: list[Leaf] = []
     try:
-        end = lay_out(Structure(fixed, structure.align), 0, leaves)
+        end = lay_out(ctf.Structure(fixed, structure.align), 0, leaves)
     except DynamicError:
         return None
     align, size = max(structure.align // BYTE, 1), -(-end // BYTE)
@@ -209,22 +199,22 @@ def _part(leaf: Leaf) -> Part | None:
     """Return the place of a number or array; None if it does not lie on whole bytes."""
     if leaf.position % BYTE:
         return None
-    element: Type = leaf.type
+    element: ctf.Type = leaf.type
     count: int | None = None
-    if isinstance(leaf.type, Array):
+    if isinstance(leaf.type, ctf.Array):
         if leaf.type.is_text or not is_dense(leaf.type.element):
             return None
         element, count = leaf.type.element, leaf.type.length
-    if not isinstance(element, Integer | Real) or not _is_whole(element):
+    if not isinstance(element, ctf.Integer | ctf.Real) or not _is_whole(element):
         return None
     return Part(leaf.position // BYTE, dtype_of(element), element.size // BYTE, count)
 
 
-def _is_whole(number: Integer | Real) -> bool:
+def _is_whole(number: ctf.Integer | ctf.Real) -> bool:
     return number.size in _WIDTHS
 
 
-def dtype_of(number: Integer | Real) -> str:
+def dtype_of(number: ctf.Integer | ctf.Real) -> str:
     """Return numpy's name for a number of whole bytes."""
-    kind = "f" if isinstance(number, Real) else "i" if number.signed else "u"
+    kind = "f" if isinstance(number, ctf.Real) else "i" if number.signed else "u"
     return f"{'>' if number.big_endian else '<'}{kind}{number.size // BYTE}"

@@ -7,17 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 from uuid import UUID
 
+from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.field_reader import FieldReader
-from msgflow.trace.ctf.field_types import (
-    BYTE,
-    Array,
-    FieldError,
-    Integer,
-    MetadataError,
-    Role,
-    Scope,
-    Structure,
-)
+from msgflow.trace.ctf.field_types import BYTE, FieldError, MetadataError, Role, Scope
 from msgflow.trace.ctf.layout import DynamicError, Leaf, lay_out
 
 if TYPE_CHECKING:
@@ -92,15 +84,15 @@ class HeaderReader:
             lay_out(self._trace.packet_header, 0, leaves)
         match leaves[:2]:
             case [
-                Leaf(type=Integer(size=32, big_endian=big_endian) as magic),
-                Leaf(type=Array() as uuid, position=32),
+                Leaf(type=ctf.Integer(size=32, big_endian=big_endian) as magic),
+                Leaf(type=ctf.Array() as uuid, position=32),
             ] if uuid_text and Role.MAGIC in magic.roles and Role.UUID in uuid.roles:
                 order: Literal["big", "little"] = "big" if big_endian else "little"
                 return MAGIC.to_bytes(4, order) + bytes.fromhex(uuid_text.replace("-", ""))
         return None
 
     def _read_scope(
-        self, reader: FieldReader, available: int, scope: Scope, structure: Structure
+        self, reader: FieldReader, available: int, scope: Scope, structure: ctf.Structure
     ) -> dict[str, Any]:
         try:
             return reader.read_scope(scope, structure)
@@ -122,7 +114,7 @@ class HeaderReader:
         return stream
 
 
-def _size(header: Structure, context: Structure) -> int:
+def _size(header: ctf.Structure, context: ctf.Structure) -> int:
     try:
         return lay_out(context, lay_out(header, 0)) // BYTE + 1
     except DynamicError:

@@ -6,23 +6,10 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 from uuid import UUID
 
+from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
-from msgflow.trace.ctf.field_types import (
-    Array,
-    Choice,
-    Integer,
-    Member,
-    MetadataError,
-    Reference,
-    Role,
-    Scope,
-    Sequence,
-    Structure,
-    Type,
-    Variant,
-    may_have,
-)
+from msgflow.trace.ctf.field_types import MetadataError, Reference, Role, Scope, may_have
 from msgflow.trace.ctf.tsdl_tokens import Token, tokens_of
 from msgflow.trace.ctf.tsdl_types import TypeParser, Value, without_prefix
 
@@ -55,7 +42,7 @@ _SCOPES = {
     "fields": Scope.PAYLOAD,
 }
 _MOST_FIELDS = 100_000
-Frames = list[dict[str, Type]]
+Frames = list[dict[str, ctf.Type]]
 
 
 @dataclass
@@ -63,7 +50,7 @@ class _Block:
     """A `trace`, `stream`, `event`, `clock` or `env` block."""
 
     values: dict[str, Value] = field(default_factory=dict)
-    structures: dict[Scope, Structure] = field(default_factory=dict)
+    structures: dict[Scope, ctf.Structure] = field(default_factory=dict)
 
     def integer(self, name: str, default: int) -> int:
         value = self.values.get(name, default)
@@ -148,7 +135,7 @@ def _is_big_endian(tokens: list[Token]) -> bool:
 def _trace_class(blocks: _Blocks) -> TraceClass:
     if blocks.trace is None:
         raise MetadataError("there is no `trace` block")
-    outer = {Scope.PACKET_HEADER: Structure()}
+    outer = {Scope.PACKET_HEADER: ctf.Structure()}
     _add(outer, blocks.trace, Scope.PACKET_HEADER)
     trace = TraceClass(
         uuid=_uuid(blocks.trace),
@@ -159,7 +146,7 @@ def _trace_class(blocks: _Blocks) -> TraceClass:
         str(block.values.get("name", "")): _clock(block, trace.notes) for block in blocks.clocks
     }
     only_clock = next(iter(clocks.values())) if len(clocks) == 1 else None
-    scopes: dict[int, dict[Scope, Structure]] = {}
+    scopes: dict[int, dict[Scope, ctf.Structure]] = {}
     # A trace may have a single stream that is not worth a block.
     for block in blocks.streams or [_Block()]:
         stream_scopes = dict(outer)
@@ -193,19 +180,19 @@ def _trace_class(blocks: _Blocks) -> TraceClass:
     return trace
 
 
-def _add(scopes: dict[Scope, Structure], block: _Block, scope: Scope) -> None:
+def _add(scopes: dict[Scope, ctf.Structure], block: _Block, scope: Scope) -> None:
     """Add the structure of a scope, after those that it may refer to."""
-    frames: dict[Scope, dict[str, Type]] = {
+    frames: dict[Scope, dict[str, ctf.Type]] = {
         known: {member.name: member.type for member in of_scope.members}
         for known, of_scope in scopes.items()
         if known < scope
     }
-    declared = block.structures.get(scope, Structure())
+    declared = block.structures.get(scope, ctf.Structure())
     outer = [frames[known] for known in sorted(frames)]
     scopes[scope] = _Resolver(scope, frames).structure(declared, outer)
 
 
-def _clock_of(scopes: Mapping[Scope, Structure], clocks: Mapping[str, Clock]) -> Clock | None:
+def _clock_of(scopes: Mapping[Scope, ctf.Structure], clocks: Mapping[str, Clock]) -> Clock | None:
     """Return the clock to which a field of the packet context or event header is mapped."""
     for scope in (Scope.EVENT_HEADER, Scope.PACKET_CONTEXT):
         for name in _mapped_clocks(scopes[scope]):
@@ -215,13 +202,13 @@ def _clock_of(scopes: Mapping[Scope, Structure], clocks: Mapping[str, Clock]) ->
     return None
 
 
-def _mapped_clocks(declared: Type) -> list[str]:
+def _mapped_clocks(declared: ctf.Type) -> list[str]:
     match declared:
-        case Structure(members=members):
+        case ctf.Structure(members=members):
             return [name for member in members for name in _mapped_clocks(member.type)]
-        case Variant(choices=choices):
+        case ctf.Variant(choices=choices):
             return [name for choice in choices for name in _mapped_clocks(choice.type)]
-        case Integer(roles=roles):
+        case ctf.Integer(roles=roles):
             return [role.partition(".")[2] for role in roles if role.startswith("clock.")]
         case _:
             return []
@@ -254,56 +241,56 @@ class _Resolver:
     The selector is an enumeration declared before, and its labels are the names of the options.
     """
 
-    def __init__(self, scope: Scope, scopes: dict[Scope, dict[str, Type]]) -> None:
+    def __init__(self, scope: Scope, scopes: dict[Scope, dict[str, ctf.Type]]) -> None:
         self._scope = scope
         self._scopes = scopes
         self._roles = _ROLES.get(scope, {})
         self._count = 0
 
-    def structure(self, declared: Structure, frames: Frames) -> Structure:
-        frame: dict[str, Type] = {}
+    def structure(self, declared: ctf.Structure, frames: Frames) -> ctf.Structure:
+        frame: dict[str, ctf.Type] = {}
         self._scopes.setdefault(self._scope, frame)
         members = []
         for member in declared.members:
             field = self._with_role(member.name, self._type(member.type, [*frames, frame]))
             frame[member.name] = field
-            members.append(Member(member.name, field))
-        return Structure(tuple(members), declared.minimum_align)
+            members.append(ctf.Member(member.name, field))
+        return ctf.Structure(tuple(members), declared.minimum_align)
 
-    def _with_role(self, name: str, declared: Type) -> Type:
+    def _with_role(self, name: str, declared: ctf.Type) -> ctf.Type:
         role = self._roles.get(name)
-        if role and isinstance(declared, Integer | Array) and may_have(declared, role):
+        if role and isinstance(declared, ctf.Integer | ctf.Array) and may_have(declared, role):
             return replace(declared, roles=declared.roles | {role})
         return declared
 
-    def _type(self, declared: Type, frames: Frames) -> Type:
+    def _type(self, declared: ctf.Type, frames: Frames) -> ctf.Type:
         self._count += 1
         if self._count > _MOST_FIELDS:
             # Structures that contain others by name can grow without limit.
             raise MetadataError(f"a structure has more than {_MOST_FIELDS} fields")
         match declared:
-            case Structure():
+            case ctf.Structure():
                 return self.structure(declared, frames)
-            case Array() | Sequence():
+            case ctf.Array() | ctf.Sequence():
                 return replace(declared, element=self._type(declared.element, frames))
-            case Variant():
+            case ctf.Variant():
                 return self._variant(declared, frames)
             case _:
                 return declared
 
-    def _variant(self, declared: Variant, frames: Frames) -> Variant:
+    def _variant(self, declared: ctf.Variant, frames: Frames) -> ctf.Variant:
         selector = self._find(declared.selector, frames)
-        if not isinstance(selector, Integer) or selector.labels is None:
+        if not isinstance(selector, ctf.Integer) or selector.labels is None:
             path = ".".join(map(str, declared.selector.path))
             raise MetadataError(f"the selector {path!r} of a variant is no enumeration before it")
         choices = []
         for choice in declared.choices:
             name = without_prefix(choice.name)
             ranges = selector.labels.get(choice.name) or selector.labels.get(name) or ()
-            choices.append(Choice(name, self._type(choice.type, frames), ranges))
+            choices.append(ctf.Choice(name, self._type(choice.type, frames), ranges))
         return replace(declared, choices=tuple(choices))
 
-    def _find(self, reference: Reference, frames: Frames) -> Type | None:
+    def _find(self, reference: Reference, frames: Frames) -> ctf.Type | None:
         if reference.scope is not None:
             return _follow(self._scopes.get(reference.scope), reference.path)
         for frame in reversed(frames):
@@ -312,20 +299,20 @@ class _Resolver:
         return None
 
 
-def _follow(frame: dict[str, Type] | None, path: tuple[str | None, ...]) -> Type | None:
-    found: Type | None = None
+def _follow(frame: dict[str, ctf.Type] | None, path: tuple[str | None, ...]) -> ctf.Type | None:
+    found: ctf.Type | None = None
     for name in path:
         if frame is None or name is None:
             return None
         found = frame.get(name)
         match found:
-            case Structure(members=members):
+            case ctf.Structure(members=members):
                 frame = {member.name: member.type for member in members}
-            case Variant(choices=choices):
+            case ctf.Variant(choices=choices):
                 frame = {
                     member.name: member.type
                     for choice in choices
-                    if isinstance(choice.type, Structure)
+                    if isinstance(choice.type, ctf.Structure)
                     for member in choice.type.members
                 }
             case _:

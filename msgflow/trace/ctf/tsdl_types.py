@@ -5,21 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.field_types import (
-    BYTE,
-    Array,
-    Choice,
-    Integer,
-    Member,
-    Real,
-    Reference,
-    Scope,
-    Sequence,
-    String,
-    Structure,
-    Type,
-    Variant,
-)
+from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.field_types import BYTE, Reference, Scope
 from msgflow.trace.ctf.tsdl_tokens import TokenStream
 
 if TYPE_CHECKING:
@@ -52,7 +39,7 @@ class TypeParser(TokenStream):
         """Parse `tokens`; `big_endian` is the trace's own byte order."""
         super().__init__(tokens)
         self._big_endian = big_endian
-        self._named: list[dict[str, Type]] = [{}]
+        self._named: list[dict[str, ctf.Type]] = [{}]
 
     def open_block(self) -> None:
         """Begin a block: names declared in it are forgotten at its end."""
@@ -88,18 +75,18 @@ class TypeParser(TokenStream):
             self.type_before({";"})
         self.expect(";")
 
-    def type_before(self, ends: set[str]) -> Type:
+    def type_before(self, ends: set[str]) -> ctf.Type:
         """Parse a type without declarator, which is followed by one of these signs."""
         return self._specifier(ends=ends)
 
-    def structure(self) -> Structure:
+    def structure(self) -> ctf.Structure:
         """Parse the structure of a scope, up to its semicolon."""
         declared = self.type_before({";"})
-        if not isinstance(declared, Structure):
+        if not isinstance(declared, ctf.Structure):
             raise self.error("expected a structure")
         return declared
 
-    def _specifier(self, ends: set[str] | None = None, one_name_is_left: bool = False) -> Type:
+    def _specifier(self, ends: set[str] | None = None, one_name_is_left: bool = False) -> ctf.Type:
         while self.take_if("const"):
             pass
         if self.take_if("integer"):
@@ -109,7 +96,7 @@ class TypeParser(TokenStream):
         if self.take_if("string"):
             if self.token.value == "{":
                 self._attributes()
-            return String()
+            return ctf.String()
         if self.take_if("struct"):
             return self._struct()
         if self.take_if("variant"):
@@ -131,7 +118,7 @@ class TypeParser(TokenStream):
             raise self.error(f"expected a type, found {self.token.value!r}")
         return " ".join(words)
 
-    def _find(self, name: str) -> Type:
+    def _find(self, name: str) -> ctf.Type:
         for block in reversed(self._named):
             if name in block:
                 return block[name]
@@ -180,13 +167,13 @@ class TypeParser(TokenStream):
             raise self.error(f"there is no byte order {order!r}")
         return self._big_endian
 
-    def _integer(self) -> Integer:
+    def _integer(self) -> ctf.Integer:
         values = self._attributes()
         size = self._size_of(values, "size", None)
         if size > _MOST_BITS:
             raise self.error(f"an integer of {size} bits is too large")
         encoding = str(values.get("encoding", "none"))
-        return Integer(
+        return ctf.Integer(
             size=size,
             align=self._align_of(values, 1 if size % BYTE else BYTE),
             big_endian=self._is_big_endian(values),
@@ -198,15 +185,15 @@ class TypeParser(TokenStream):
             else frozenset(),
         )
 
-    def _real(self) -> Real:
+    def _real(self) -> ctf.Real:
         values = self._attributes()
         digits = (values.get("exp_dig"), values.get("mant_dig"))
         sizes: dict[tuple[Value | None, Value | None], int] = {(8, 24): 32, (11, 53): 64}
         if digits not in sizes:
             raise self.error("a floating point number must have 32 or 64 bits")
-        return Real(sizes[digits], self._align_of(values, 1), self._is_big_endian(values))
+        return ctf.Real(sizes[digits], self._align_of(values, 1), self._is_big_endian(values))
 
-    def _struct(self) -> Type:
+    def _struct(self) -> ctf.Type:
         name = self.name() if self.token.kind == "name" and self.token.value != "align" else ""
         if name and self.token.value != "{":
             return self._find(f"struct {name}")
@@ -216,14 +203,14 @@ class TypeParser(TokenStream):
             self.expect("(")
             align = self._checked_align(self.number())
             self.expect(")")
-        structure = Structure(
-            tuple(Member(without_prefix(key), member) for key, member in members), align
+        structure = ctf.Structure(
+            tuple(ctf.Member(without_prefix(key), member) for key, member in members), align
         )
         if name:
             self._named[-1][f"struct {name}"] = structure
         return structure
 
-    def _members(self) -> list[tuple[str, Type]]:
+    def _members(self) -> list[tuple[str, ctf.Type]]:
         members = []
         self.open_block()
         while self.token.value != "}":
@@ -243,7 +230,7 @@ class TypeParser(TokenStream):
         self.close_block()
         return members
 
-    def _declarator(self, declared: Type) -> tuple[Type, str]:
+    def _declarator(self, declared: ctf.Type) -> tuple[ctf.Type, str]:
         """Parse a name and its array dimensions."""
         name = self.name()
         dimensions: list[int | Reference] = []
@@ -259,13 +246,13 @@ class TypeParser(TokenStream):
         field = declared
         for dimension in reversed(dimensions):
             field = (
-                Array(field, dimension)
+                ctf.Array(field, dimension)
                 if isinstance(dimension, int)
-                else Sequence(field, dimension)
+                else ctf.Sequence(field, dimension)
             )
         return field, name
 
-    def _variant(self) -> Type:
+    def _variant(self) -> ctf.Type:
         """Parse a variant; without a selector it only gets a name, and says it where it is used."""
         name = self.name() if self.token.kind == "name" else ""
         selector = ""
@@ -274,28 +261,28 @@ class TypeParser(TokenStream):
             self.expect(">")
         if self.token.value == "{":
             # Which values choose which option is resolved with the selector's labels.
-            choices = (Choice(key, member, ()) for key, member in self._members())
-            declared: Type = Variant(Reference(None, ()), tuple(choices))
+            choices = (ctf.Choice(key, member, ()) for key, member in self._members())
+            declared: ctf.Type = ctf.Variant(Reference(None, ()), tuple(choices))
             if name:
                 self._named[-1][f"variant {name}"] = declared
         else:
             declared = self._find(f"variant {name}")
-        if selector and isinstance(declared, Variant):
+        if selector and isinstance(declared, ctf.Variant):
             return replace(declared, selector=reference_of(selector))
         if self.token.kind == "name":
             raise self.error(f"the variant {self.token.value!r} has no selector")
-        return Structure()
+        return ctf.Structure()
 
-    def _enumeration(self) -> Type:
+    def _enumeration(self) -> ctf.Type:
         name = self.name() if self.token.kind == "name" else ""
-        container: Type | None = None
+        container: ctf.Type | None = None
         if self.take_if(":"):
             container = self._specifier(ends={"{"})
         if self.token.value != "{":
             return self._find(f"enum {name}")
         if container is None:
             container = self._find("int")
-        if not isinstance(container, Integer):
+        if not isinstance(container, ctf.Integer):
             raise self.error("an enumeration must be of an integer type")
         enumeration = replace(container, labels=self._labels(), is_text=False, base=10)
         if name:
