@@ -47,7 +47,8 @@ def open_file(
     with opening(path):
         con = duckdb.connect(str(path), read_only=read_only, config=config)
         # A file that this process has open already is the same database, with its settings.
-        if not _is_shut_in(con):
+        setting = "SELECT current_setting('enable_external_access')"
+        if con.execute(setting).fetchall() != [(False,)]:
             try:
                 if memory_limit is not None:
                     set_memory_limit(con, memory_limit)
@@ -87,11 +88,6 @@ def shut_in(
     con.execute("SET enable_external_access = false")
     if lock:
         con.execute("SET lock_configuration = true")
-
-
-def _is_shut_in(con: duckdb.DuckDBPyConnection) -> bool:
-    found = con.execute("SELECT current_setting('enable_external_access')").fetchall()
-    return found == [(False,)]
 
 
 def spill_directory(database: Path) -> Path:

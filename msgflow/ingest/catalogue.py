@@ -237,16 +237,12 @@ def _tracepoint(entry: dict[str, Any]) -> Tracepoint:
     fields = tuple(
         Field(**{**field, "aliases": tuple(field.get("aliases", ()))}) for field in entry["fields"]
     )
-    predecessors = tuple(_predecessor(text) for text in entry.get("predecessors", ()))
+    pairs = (text.split(".") for text in entry.get("predecessors", ()))
+    predecessors = tuple(Predecessor(sequence, Origin(origin)) for sequence, origin in pairs)
     tuples = {name: tuple(entry.get(name, ())) for name in ("aliases", "sequences")}
     role = CpuRole(entry["role"]) if "role" in entry else None
     given = {"fields": fields, "predecessors": predecessors, "role": role}
     return Tracepoint(**{**entry, **tuples, **given})
-
-
-def _predecessor(text: str) -> Predecessor:
-    sequence, _, origin = text.partition(".")
-    return Predecessor(sequence, Origin(origin))
 
 
 def _arrow_type(sql_type: str) -> pa.DataType:

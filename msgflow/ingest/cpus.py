@@ -74,7 +74,9 @@ class Cpus:
         self, batches: Sequence[tuple[Tracepoint, pa.RecordBatch]]
     ) -> list[tuple[str, pa.RecordBatch]]:
         """Return (table, rows) of the events of one round that have a role on their CPU."""
-        groups = Groups(gathered(batches, "event_id"), self._cpus_of(batches))
+        traces = gathered(batches, "trace_index").astype(np.int64)
+        cpus = self._cpus.of(traces << 32 | gathered(batches, "cpu_id"))
+        groups = Groups(gathered(batches, "event_id"), cpus)
         events = self._events(batches, groups)
         for latest in (self._switches, *self._handlings):
             latest.grow(self._cpus.count)
@@ -116,10 +118,6 @@ class Cpus:
                     rows = self._interrupts(batch, kind, start_ns, switch["tid"][at], is_whole)
                     placed.append((INTERRUPT, rows))
         return placed
-
-    def _cpus_of(self, batches: Sequence[tuple[Any, pa.RecordBatch]]) -> NDArray[np.int32]:
-        traces = gathered(batches, "trace_index").astype(np.int64)
-        return self._cpus.of(traces << 32 | gathered(batches, "cpu_id"))
 
     def _events(
         self, batches: Sequence[tuple[Tracepoint, pa.RecordBatch]], groups: Groups

@@ -56,14 +56,11 @@ class Corrections:
     def applied(self, batch: pa.RecordBatch) -> pa.RecordBatch:
         """Return the corrected events of a batch, perhaps none."""
         if self.duplicates.size:
-            batch = self._without_copies(batch)
+            is_copy = _are_among(to_numpy(batch["event_id"]), self.duplicates)[0]
+            batch = batch.filter(to_arrow(~is_copy)) if is_copy.any() else batch
         if self.processes.size and batch["pid_ns"].null_count:
             batch = self._with_namespaces(batch)
         return batch
-
-    def _without_copies(self, batch: pa.RecordBatch) -> pa.RecordBatch:
-        is_copy = _are_among(to_numpy(batch["event_id"]), self.duplicates)[0]
-        return batch.filter(to_arrow(~is_copy)) if is_copy.any() else batch
 
     def _with_namespaces(self, batch: pa.RecordBatch) -> pa.RecordBatch:
         names = batch["procname"]

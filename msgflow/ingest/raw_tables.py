@@ -32,7 +32,6 @@ class RawTables:
     def __init__(
         self, con: duckdb.DuckDBPyConnection, *, may_hold: bool, may_replace: bool
     ) -> None:
-        """Start with nothing waiting, inside an open transaction."""
         self._con = con
         self._may_hold = may_hold
         self._may_replace = may_replace

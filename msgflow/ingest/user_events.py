@@ -67,10 +67,6 @@ def user_rows(con: duckdb.DuckDBPyConnection, name: str, batch: pa.RecordBatch) 
         finally:
             con.unregister(_BATCH)
     else:
-        fields = _repeated("{}", batch.num_rows)
-    named = _repeated(name, batch.num_rows)
+        fields = pa.repeat("{}", batch.num_rows)
+    named = pa.repeat(name, batch.num_rows)
     return pa.RecordBatch.from_arrays([*batch.columns[:common], named, fields], schema=_SCHEMA)
-
-
-def _repeated(text: str, count: int) -> pa.Array:
-    return pa.repeat(pa.scalar(text), count)

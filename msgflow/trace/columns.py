@@ -106,7 +106,7 @@ def paths_of(
     types = {field.name: field.type for field in fields}
     found: list[tuple[tuple[str, ...], ...]] = []
     for column in columns:
-        wanted = _plain(column.type)
+        wanted = column.type.value_type if pa.types.is_dictionary(column.type) else column.type
         aliases = (column.metadata or {}).get(ALIASES, b"").decode()
         names = (column.name, *filter(None, aliases.split(",")))
         plain = next((name for name in names if _can_hold(wanted, types.get(name))), None)
@@ -165,10 +165,6 @@ def batch_of(rows: Sequence[Sequence[Any]], schema: pa.Schema) -> pa.RecordBatch
     filled = zip(zip(*rows, strict=True), schema.types, strict=True)
     arrays = [to_array(values, data_type) for values, data_type in filled]
     return pa.RecordBatch.from_arrays(arrays, schema=schema)
-
-
-def _plain(data_type: pa.DataType) -> pa.DataType:
-    return data_type.value_type if pa.types.is_dictionary(data_type) else data_type
 
 
 def _valid_text(value: Any) -> Any:

@@ -9,7 +9,7 @@ from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.field_types import BYTE, FieldError, Reference, Role, Scope, aligned
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
 
@@ -31,17 +31,6 @@ class FieldReader:
         self._scopes: dict[Scope, dict[str, Any]] = {}
         self._frames: list[dict[str, Any]] = []
         self._empty_elements = 0
-        self._readers: dict[type, Callable[[Any], Any]] = {
-            ctf.Integer: self._integer,
-            ctf.VariableInteger: self._variable_integer,
-            ctf.Real: self._real,
-            ctf.String: self._string,
-            ctf.Array: self._array,
-            ctf.Sequence: self._sequence,
-            ctf.Structure: self._structure,
-            ctf.Variant: self._variant,
-            ctf.Optional: self._optional,
-        }
 
     def read_scope(self, scope: Scope, structure: ctf.Structure) -> dict[str, Any]:
         """Read one of the structures of a packet or event."""
@@ -56,7 +45,38 @@ class FieldReader:
         return values
 
     def _read(self, field_type: ctf.Type) -> Any:
-        return self._readers[type(field_type)](field_type)
+        match field_type:
+            case ctf.Integer():
+                return self._integer(field_type)
+            case ctf.VariableInteger():
+                return self._variable_integer(field_type)
+            case ctf.Real():
+                bits = self._bits(field_type.size, field_type.align, field_type.big_endian)
+                codes = ("<I", "<f") if field_type.size == 32 else ("<Q", "<d")
+                return float(struct.unpack(codes[1], struct.pack(codes[0], bits))[0])
+            case ctf.String():
+                return self._string(field_type)
+            case ctf.Array():
+                return self._elements(field_type, field_type.length)
+            case ctf.Sequence():
+                length = self._look_up(field_type.length)
+                if length < 0:
+                    raise FieldError("the length of a sequence is no length")
+                return self._elements(field_type, length)
+            case ctf.Structure():
+                values: dict[str, Any] = {}
+                self._fill(field_type, values)
+                return values
+            case ctf.Variant():
+                value = self._look_up(field_type.selector)
+                for choice in field_type.choices:
+                    if choice.holds(value):
+                        return {choice.name: self._read(choice.type)}
+                raise FieldError(f"a variant has no option for the value {value}")
+            case ctf.Optional():
+                value = self._look_up(field_type.selector)
+                is_there = any(first <= value <= last for first, last in field_type.ranges)
+                return self._read(field_type.content) if is_there else None
 
     def _take(self, size: int, align: int = 1) -> int:
         """Return the position of so many bits and go on behind them."""
@@ -99,11 +119,6 @@ class FieldReader:
             self.found[role], self.bits[role] = value, 64
         return value
 
-    def _real(self, field_type: ctf.Real) -> float:
-        bits = self._bits(field_type.size, field_type.align, field_type.big_endian)
-        codes = ("<I", "<f") if field_type.size == 32 else ("<Q", "<d")
-        return float(struct.unpack(codes[1], struct.pack(codes[0], bits))[0])
-
     def _string(self, field_type: ctf.String) -> str:
         begin = self._take(0, field_type.align) // BYTE
         end = self._end // BYTE
@@ -119,15 +134,6 @@ class FieldReader:
             size *= 2
         self.position = (begin + length + 1) * BYTE
         return content[:length].decode("utf-8", "replace")
-
-    def _array(self, field_type: ctf.Array) -> Any:
-        return self._elements(field_type, field_type.length)
-
-    def _sequence(self, field_type: ctf.Sequence) -> Any:
-        length = self._look_up(field_type.length)
-        if not isinstance(length, int) or length < 0:
-            raise FieldError("the length of a sequence is no length")
-        return self._elements(field_type, length)
 
     def _elements(self, field_type: ctf.Array | ctf.Sequence, length: int) -> Any:
         element = field_type.element
@@ -152,11 +158,6 @@ class FieldReader:
         self.found |= dict.fromkeys(roles, content)
         return list(content)
 
-    def _structure(self, field_type: ctf.Structure) -> dict[str, Any]:
-        values: dict[str, Any] = {}
-        self._fill(field_type, values)
-        return values
-
     def _fill(self, field_type: ctf.Structure, values: dict[str, Any]) -> None:
         """Read a structure into `values`, in which later members look up lengths and selectors."""
         self._take(0, field_type.align)
@@ -169,19 +170,6 @@ class FieldReader:
             else:
                 values[member.name] = self._read(member.type)
         self._frames.pop()
-
-    def _variant(self, field_type: ctf.Variant) -> dict[str, Any]:
-        value = self._look_up(field_type.selector)
-        for choice in field_type.choices:
-            if choice.holds(value):
-                return {choice.name: self._read(choice.type)}
-        raise FieldError(f"a variant has no option for the value {value}")
-
-    def _optional(self, field_type: ctf.Optional) -> Any:
-        value = self._look_up(field_type.selector)
-        if any(first <= value <= last for first, last in field_type.ranges):
-            return self._read(field_type.content)
-        return None
 
     def _look_up(self, reference: Reference) -> int:
         value = None

@@ -51,7 +51,6 @@ class StreamLayout:
     def __init__(
         self, trace_index: int, trace: TraceClass, stream: StreamClass, first_number: int
     ) -> None:
-        """Compile the layouts of all event classes."""
         self.trace_index = trace_index
         self.trace = trace
         self.stream = stream
