@@ -46,7 +46,11 @@ def join_bag(
         if len(runs) > 1:
             raise UsageError("a bag is of one run", "give its name with --run")
         (one,) = runs
-        _require_one_time(con, one)
+        if con.execute(_CLOCKS_APART, [one.run_id]).fetchall() == [(True,)]:
+            raise UsageError(
+                f"the run has hosts whose clocks are not synchronised — {one.name}",
+                f"msgflow clocks apply messages --run {one.name}",
+            )
         given: dict[str, Any] = {"run_id": one.run_id}
         con.register("bag_messages", messages)
         con.execute("CREATE OR REPLACE TEMP TABLE bag_read AS FROM bag_messages")
@@ -62,11 +66,3 @@ def join_bag(
     # The database is opened for a bag that can be read.
     with read_bag(bag, memory_limit=memory_limit) as messages:
         return change_runs(path, run, join, memory_limit=memory_limit)
-
-
-def _require_one_time(con: duckdb.DuckDBPyConnection, run: Run) -> None:
-    if con.execute(_CLOCKS_APART, [run.run_id]).fetchall() == [(True,)]:
-        raise UsageError(
-            f"the run has hosts whose clocks are not synchronised — {run.name}",
-            f"msgflow clocks apply messages --run {run.name}",
-        )

@@ -113,20 +113,20 @@ def short_name(header: Header) -> str:
 def composed(layer: str) -> tuple[Header, ...]:
     """Return the objects of a layer of `schema/` that are made of all kinds of findings."""
     if layer == "model":
+        name, grain = "staging.finding", "one row per place"
         description = "What was found in the input while it was read and the model was built."
-        rows = statement(kinds_of("input"))
-        return (_object("staging.finding", description, "one row per place", rows),)
-    if layer == "stat":
-        rows = "VALUES\n" + ",\n".join(map(_row, (*kinds_of("input"), *kinds_of("recording"))))
-        return (
-            _object(
-                "derive.finding_kind",
-                "What an ingest can find, and what the headers in `schema/health` say about it.",
-                "one row per kind of finding",
-                f"SELECT {_OF_KIND}\nFROM (\n{rows}\n) AS kind ({_OF_KIND})\n",
-            ),
+        body = statement(kinds_of("input"))
+    elif layer == "stat":
+        name, grain = "derive.finding_kind", "one row per kind of finding"
+        description = (
+            "What an ingest can find, and what the headers in `schema/health` say about it."
         )
-    return ()
+        rows = ",\n".join(map(_row, (*kinds_of("input"), *kinds_of("recording"))))
+        body = f"SELECT {_OF_KIND}\nFROM (\nVALUES\n{rows}\n) AS kind ({_OF_KIND})\n"
+    else:
+        return ()
+    path = _statements().directory
+    return (Header(name, name, description, grain, "view", body, path),)
 
 
 def statement(headers: Sequence[Header]) -> str:
@@ -225,18 +225,6 @@ def _row(header: Header) -> str:
         header.cause, header.cure,
     )  # fmt: skip
     return f"    ({', '.join(literal(text or '') for text in texts)})"
-
-
-def _object(name: str, description: str, grain: str, body: str) -> Header:
-    return Header(
-        name=name,
-        title=name,
-        description=description,
-        grain=grain,
-        kind="view",
-        body=body,
-        path=_statements().directory,
-    )
 
 
 @cache

@@ -26,13 +26,7 @@ class EventFormat(StrEnum):
 TABLES = (EventFormat.CSV, EventFormat.PARQUET)
 """The formats with columns."""
 
-_SUFFIXES = {
-    ".txt": EventFormat.TEXT,
-    ".json": EventFormat.JSON,
-    ".jsonl": EventFormat.JSONL,
-    ".csv": EventFormat.CSV,
-    ".parquet": EventFormat.PARQUET,
-}
+_SUFFIXES = {".txt": EventFormat.TEXT, **{f".{form}": form for form in list(EventFormat)[1:]}}
 
 
 def is_directory(path: Path) -> bool:

@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from msgflow.events.formats import TABLES, EventFormat, table_writer
-from msgflow.events.sequence import Sequencer, json_column, json_line, text_line
+from msgflow.events.sequence import COLUMNS, Sequencer, json_column, json_line, text_line
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -17,21 +17,7 @@ if TYPE_CHECKING:
     from msgflow.trace import Progress
 
 
-_SCHEMA = pa.schema(
-    [
-        ("event_id", pa.int64()),
-        ("ts_ns", pa.int64()),
-        ("trace_index", pa.int32()),
-        ("hostname", pa.string()),
-        ("name", pa.string()),
-        ("cpu_id", pa.int32()),
-        ("vpid", pa.int32()),
-        ("vtid", pa.int32()),
-        ("procname", pa.string()),
-        ("pid_ns", pa.int64()),
-        ("fields", pa.string()),
-    ]
-)
+_SCHEMA = pa.schema([*COLUMNS.items(), ("fields", pa.string())])
 _ROW_GROUP_ROWS = 100_000
 
 

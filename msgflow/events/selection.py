@@ -16,7 +16,7 @@ from msgflow.run.choice import Run
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE
 from msgflow.trace import PACKET, EventBatch
-from msgflow.trace.schemas import COMMON_SCHEMA
+from msgflow.trace.columns import COMMON_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

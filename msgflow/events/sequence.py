@@ -10,8 +10,7 @@ import pyarrow as pa
 
 from msgflow.sql.json_fields import MOST_LAMBDAS, column_name, json_fields, label_of, member
 from msgflow.sql.quoting import literal
-from msgflow.trace.columns import BASE
-from msgflow.trace.schemas import COMMON_SCHEMA
+from msgflow.trace.columns import BASE, COMMON_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,19 +21,19 @@ Rendering = Callable[[str, pa.Schema], str]
 """From an event's name and payload columns to the SQL of its row, over `COLUMNS` and `hostname`,
 `thread` and the payload as `column_name` gives it."""
 
-COLUMNS = (
-    "event_id",
-    "ts_ns",
-    "trace_index",
-    "hostname",
-    "name",
-    "cpu_id",
-    "vpid",
-    "vtid",
-    "procname",
-    "pid_ns",
-)
-"""The columns that events of every name have, where a format has columns."""
+COLUMNS = {
+    "event_id": pa.int64(),
+    "ts_ns": pa.int64(),
+    "trace_index": pa.int32(),
+    "hostname": pa.string(),
+    "name": pa.string(),
+    "cpu_id": pa.int32(),
+    "vpid": pa.int32(),
+    "vtid": pa.int32(),
+    "procname": pa.string(),
+    "pid_ns": pa.int64(),
+}
+"""The columns that events of every name have, where a format has columns, with their types."""
 
 _WITHOUT = -1
 # Controls, characters without a shape, and line separators: no terminal may obey a trace.

@@ -14,8 +14,8 @@ from msgflow.db.transaction import transaction
 from msgflow.ingest import overlapping_traces, staging
 from msgflow.ingest.catalogue import USER_EVENT, load
 from msgflow.ingest.cpus import Cpus
-from msgflow.ingest.raw_tables import RawTables
 from msgflow.ingest.sequences import Placed, Sequences
+from msgflow.ingest.staging import RawTables
 from msgflow.ingest.user_events import is_match, matches, names_of, user_rows
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
 from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_numpy, without

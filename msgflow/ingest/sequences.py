@@ -15,8 +15,8 @@ import pyarrow as pa
 
 from msgflow.ingest.catalogue import Origin
 from msgflow.ingest.groups import NONE, Groups, Latest, Numbers, gathered, present
+from msgflow.trace.columns import COMMON_SCHEMA
 from msgflow.trace.numpy_arrow import empty_batch, is_valid, texts_to_arrow, to_arrow, to_numpy
-from msgflow.trace.schemas import COMMON_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -113,7 +113,8 @@ class Sequences:
         ids = gathered(batches, "event_id")
         threads = self._threads.of(batches)
         groups = Groups(ids, threads)
-        members = np.repeat([self._memberships(name) for name, _ in batches], sizes)[groups.rows]
+        of_names = [sum(self._bits[s] for s in self._tracepoints[n].sequences) for n, _ in batches]
+        members = np.repeat(np.array(of_names, np.uint8), sizes)[groups.rows]
         events = {
             Origin.EVENT_ID: ids[groups.rows],
             Origin.TS_NS: gathered(batches, "ts_ns")[groups.rows],
@@ -146,9 +147,6 @@ class Sequences:
             _names(batches, groups, events),
             _cpu_returns(batches, groups, events),
         )
-
-    def _memberships(self, name: str) -> np.uint8:
-        return np.uint8(sum(self._bits[sequence] for sequence in self._tracepoints[name].sequences))
 
     def _extended(
         self,

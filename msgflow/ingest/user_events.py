@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from msgflow.ingest.catalogue import load
 from msgflow.sql.json_fields import column_name, json_fields
-from msgflow.trace.schemas import COMMON_SCHEMA
+from msgflow.trace.columns import COMMON_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

@@ -14,12 +14,12 @@ import pyarrow as pa
 from msgflow.errors import TraceError
 from msgflow.trace import bt2_library, columns
 from msgflow.trace.bt2_fields import schema_of, value_of
+from msgflow.trace.columns import COMMON_SCHEMA, PACKET_SCHEMA
 from msgflow.trace.ctf.clock import GIGA, Clock
 from msgflow.trace.ctf.packet_index import DiscardCounters
 from msgflow.trace.ctf.trace_info import description
 from msgflow.trace.metadata_frame import MetadataKind, kind_of
 from msgflow.trace.model import PACKET, EventBatch, Progress, TraceInfo
-from msgflow.trace.schemas import COMMON_SCHEMA, PACKET_SCHEMA
 from msgflow.trace.time_base import on_one_base
 from msgflow.trace.trace_set import Report, TraceSet
 

@@ -60,7 +60,12 @@ def discover(paths: Sequence[str | Path]) -> list[TraceLocation]:
     if not locations:
         raise TraceError("no trace given", hint="msgflow ingest TRACE")
     if not any(location.size_bytes for location in locations):
-        raise _nothing_recorded_error(locations)
+        raise TraceError(
+            "the trace has metadata but no events, nothing was recorded — "
+            + ", ".join(str(location.path) for location in locations),
+            hint="start the trace before the application, check that tracetools was built with "
+            "LTTng: ros2 run tracetools status",
+        )
     return locations
 
 
@@ -193,15 +198,6 @@ def _no_trace_error(path: Path, strays: Sequence[Path]) -> TraceError:
     return TraceError(
         f"no CTF trace (no file `metadata`) in this directory or below — {path}",
         hint=metadata_frame.DIRECTORY_HINT,
-    )
-
-
-def _nothing_recorded_error(locations: Sequence[TraceLocation]) -> TraceError:
-    return TraceError(
-        "the trace has metadata but no events, nothing was recorded — "
-        + ", ".join(str(location.path) for location in locations),
-        hint="start the trace before the application, check that tracetools was built with "
-        "LTTng: ros2 run tracetools status",
     )
 
 

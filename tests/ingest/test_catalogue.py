@@ -17,7 +17,7 @@ from msgflow.ingest import catalogue, staging
 from msgflow.ingest.cpus import Cpus
 from msgflow.ingest.load import without_thread
 from msgflow.ingest.sequences import Sequences
-from msgflow.trace.schemas import COMMON_SCHEMA
+from msgflow.trace.columns import COMMON_SCHEMA
 
 TYPES = {"UBIGINT", "BIGINT", "INTEGER", "VARCHAR", "UTINYINT[]", "UBIGINT[]", "INTEGER[]"}
 TRACEPOINT_KEYS = {

@@ -10,7 +10,7 @@ import pytest
 
 from msgflow.ingest.catalogue import CpuRole, load
 from msgflow.ingest.cpus import INTERRUPT, Cpus
-from msgflow.trace.schemas import COMMON_SCHEMA
+from msgflow.trace.columns import COMMON_SCHEMA
 
 Row = dict[str, Any]
 NAMES = [

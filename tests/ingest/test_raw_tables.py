@@ -9,7 +9,7 @@ import pyarrow as pa
 import pytest
 
 from msgflow.ingest import staging
-from msgflow.ingest.raw_tables import RawTables
+from msgflow.ingest.staging import RawTables
 
 
 @pytest.fixture
@@ -35,8 +35,8 @@ def rows(count: int) -> pa.RecordBatch:
 @pytest.fixture(autouse=True)
 def few_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     """100 rows are enough, and 150 are too many."""
-    monkeypatch.setattr("msgflow.ingest.raw_tables.ROWS_PER_INSERT", 100)
-    monkeypatch.setattr("msgflow.ingest.raw_tables.MOST_WAITING", 150)
+    monkeypatch.setattr("msgflow.ingest.staging.ROWS_PER_INSERT", 100)
+    monkeypatch.setattr("msgflow.ingest.staging.MOST_WAITING", 150)
 
 
 def raw_tables(con: duckdb.DuckDBPyConnection) -> RawTables:

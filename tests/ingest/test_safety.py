@@ -16,7 +16,7 @@ from thorough import few
 from msgflow.db.workspace import workspace
 from msgflow.ingest import ingest
 from msgflow.ingest import ingest as ingest_function
-from msgflow.ingest.raw_tables import RawTables
+from msgflow.ingest.staging import RawTables
 
 
 class Interruption(BaseException):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from msgflow.ingest.catalogue import Origin, load
 from msgflow.ingest.sequences import Placed, Sequences
-from msgflow.trace.schemas import COMMON_SCHEMA
+from msgflow.trace.columns import COMMON_SCHEMA
 
 NAMES = (
     "ros2:rcl_init",

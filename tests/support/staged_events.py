@@ -22,7 +22,7 @@ from msgflow.ingest.catalogue import Tracepoint, load
 from msgflow.ingest.cpus import Cpus
 from msgflow.ingest.load import without_thread
 from msgflow.ingest.sequences import Sequences
-from msgflow.trace.schemas import COMMON_SCHEMA, PACKET_SCHEMA
+from msgflow.trace.columns import COMMON_SCHEMA, PACKET_SCHEMA
 
 STEP_NS = 10
 

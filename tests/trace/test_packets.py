@@ -12,7 +12,7 @@ import pytest
 from ctf_writer import Event, Packet, TraceContent, write_index, write_trace
 
 from msgflow.trace import PACKET, TraceSet
-from msgflow.trace.schemas import PACKET_SCHEMA
+from msgflow.trace.columns import PACKET_SCHEMA
 
 Rows = dict[str, list[dict[str, Any]]]
 Open = Callable[..., TraceSet]

@@ -13,7 +13,7 @@ from ctf_writer import CONTEXTS, Event, Packet, TraceContent, write_trace
 
 from msgflow.errors import UsageError
 from msgflow.trace import PACKET, Progress, TraceSet
-from msgflow.trace.schemas import COMMON_SCHEMA
+from msgflow.trace.columns import COMMON_SCHEMA
 
 Rows = dict[str, list[dict[str, Any]]]
 Open = Callable[..., TraceSet]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.trace.columns import complete_schemas, merged_schemas
+from msgflow.trace.columns import PACKET_SCHEMA, complete_schemas, merged_schemas
 from msgflow.trace.ctf.arrow import declared_schema
 from msgflow.trace.ctf.event_order import ordered_batches
 from msgflow.trace.ctf.events import event_reader_of
@@ -18,7 +18,6 @@ from msgflow.trace.ctf.record_batch import ClassPlan, ThreadNames, build_batch, 
 from msgflow.trace.model import PACKET, EventBatch, Progress
 from msgflow.trace.numpy_arrow import integers_to_arrow
 from msgflow.trace.prefetch import prefetched
-from msgflow.trace.schemas import PACKET_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

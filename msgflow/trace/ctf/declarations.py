@@ -56,11 +56,6 @@ class TraceClass:
         stream.events[event.id] = event
 
 
-def is_timeless(trace: TraceClass) -> bool:
-    """Tell whether no stream class of a trace has a clock."""
-    return bool(trace.streams) and all(stream.clock is None for stream in trace.streams.values())
-
-
 def give_order(stream: StreamClass) -> None:
     """Prepare a stream class for packets that are ordered by numbers in place of times."""
     stream.clock, stream.has_time = Clock(), False

@@ -9,6 +9,7 @@ import numpy as np
 
 from msgflow.trace.ctf.event_header import read_headers
 from msgflow.trace.ctf.event_positions import find_positions
+from msgflow.trace.ctf.field_reader import EventReader
 from msgflow.trace.ctf.field_types import BYTE, FieldError
 from msgflow.trace.numpy_arrow import distinct
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from msgflow.trace.ctf.clock import Clock
-    from msgflow.trace.ctf.field_reader import EventReader
     from msgflow.trace.ctf.packet_memory import Memory
     from msgflow.trace.ctf.packet_order import Entry
     from msgflow.trace.ctf.stream_layout import StreamLayout
@@ -123,7 +123,7 @@ def say_nothing(entry: Entry, offset: int, message: str) -> None:
 def event_reader_of(layout: StreamLayout, memory: Memory, entry: Entry, base: int) -> EventReader:
     """Return what reads events of a packet at the byte `base` field by field."""
     content = memoryview(memory.data)[base : base + entry.size]
-    return layout.event_reader(content, entry.packet.content_bits)
+    return EventReader(layout.trace, layout.stream, content, entry.packet.content_bits)
 
 
 def _find_field_by_field(

@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 BYTE = 8
+# Limits of what metadata may declare.
+MOST_BITS = 64
+MOST_ALIGN = 1 << 20
+MOST_ELEMENTS = 1 << 40
 _UUID_BYTES = 16
 
 
@@ -113,7 +117,10 @@ class _Elements:
 
     @property
     def is_text(self) -> bool:
-        return is_character(self.element)
+        element = self.element
+        return isinstance(element, Integer) and (
+            element.is_text and element.size == BYTE == element.align
+        )
 
 
 @dataclass(frozen=True)
@@ -214,13 +221,6 @@ def may_have(declared: Type, role: str) -> bool:
         return False
     element = declared.element
     return isinstance(element, Integer) and element.size == BYTE == element.align
-
-
-def is_character(element: Type) -> bool:
-    """Tell whether an array of this element is text."""
-    return (
-        isinstance(element, Integer) and element.is_text and element.size == BYTE == element.align
-    )
 
 
 def aligned(position: int, align: int) -> int:

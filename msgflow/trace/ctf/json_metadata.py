@@ -42,9 +42,6 @@ _BIT_ORDERS = {False: "first-to-last", True: "last-to-first"}
 _CHARACTER = ctf.Integer(BYTE, BYTE, False, is_text=True)
 _BYTE = ctf.Integer(BYTE, BYTE, False)
 _TRUE = ((1, (1 << 64) - 1),)
-_MOST_BITS = 64
-_MOST_ALIGN = 1 << 20
-_MOST_ELEMENTS = 1 << 40
 
 Ranges = tuple[tuple[int, int], ...]
 
@@ -275,7 +272,7 @@ def integer_of(declared: dict[str, Any], key: str, default: int | None) -> int:
 
 def _integer(declared: dict[str, Any], kind: str) -> ctf.Integer:
     size = integer_of(declared, "length", None)
-    if not 1 <= size <= _MOST_BITS:
+    if not 1 <= size <= ctf.MOST_BITS:
         raise MetadataError(f"an integer of {size} bits makes no sense")
     integer = ctf.Integer(
         size=size,
@@ -301,14 +298,14 @@ def _is_big_endian(declared: dict[str, Any]) -> bool:
 
 def _align(declared: dict[str, Any], key: str) -> int:
     align = integer_of(declared, key, 1)
-    if align < 1 or align & (align - 1) or align > _MOST_ALIGN:
+    if align < 1 or align & (align - 1) or align > ctf.MOST_ALIGN:
         raise MetadataError(f"an alignment of {align} bits makes no sense")
     return align
 
 
 def _length(declared: dict[str, Any]) -> int:
     length = integer_of(declared, "length", None)
-    if not 0 <= length <= _MOST_ELEMENTS:
+    if not 0 <= length <= ctf.MOST_ELEMENTS:
         raise MetadataError(f"a length of {length} makes no sense")
     return length
 

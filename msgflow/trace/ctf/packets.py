@@ -51,11 +51,8 @@ def packets_of(
     `report` gets all that is wrong: the file, the number of the packet, the offset in bytes and a
     message.
     """
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        packets = list(_PacketFinder(path, descriptor, reader, report).run())
-    finally:
-        os.close(descriptor)
+    with path.open("rb", buffering=0) as file:
+        packets = list(_PacketFinder(path, file.fileno(), reader, report).run())
     early = misplaced([packet.header.begin or 0 for packet in packets])
     for place in sorted(early):
         packet = packets[place]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import metadata
 from msgflow.trace.ctf.batches import Iteration
-from msgflow.trace.ctf.declarations import give_order, is_timeless
+from msgflow.trace.ctf.declarations import give_order
 from msgflow.trace.ctf.event_positions import BEYOND_END
 from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.ctf.losses import LossCounter
@@ -74,7 +74,7 @@ class CtfTraceSet(TraceSet):
             raise unreadable_error(error, path) from error
         if not location.size_bytes:
             return TraceInfo(index, path)
-        if is_timeless(declared):
+        if all(stream_class.clock is None for stream_class in declared.streams.values()):
             for stream_class in declared.streams.values():
                 give_order(stream_class)
         layouts = {}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.trace.columns import first_inner_value, paths_of, to_array
+from msgflow.trace.columns import COMMON_SCHEMA, first_inner_value, paths_of, to_array
 from msgflow.trace.ctf.arrow import (
     declared_schema,
     list_array,
@@ -20,7 +20,6 @@ from msgflow.trace.ctf.event_body import Kind
 from msgflow.trace.ctf.field_columns import FieldRows
 from msgflow.trace.ctf.field_types import Scope, Structure
 from msgflow.trace.numpy_arrow import integers_to_arrow, texts_to_arrow, to_arrow, to_numpy
-from msgflow.trace.schemas import COMMON_SCHEMA
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence

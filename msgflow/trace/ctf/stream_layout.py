@@ -177,17 +177,12 @@ class StreamLayout:
         elif body.fields is not None:
             end = body.end(data, body_at, span.limit)
         else:
-            reader = self.event_reader(
-                memoryview(data)[span.base : span.limit], (span.limit - span.base) * BYTE
-            )
+            content = memoryview(data)[span.base : span.limit]
+            reader = EventReader(self.trace, self.stream, content, len(content) * BYTE)
             end = span.base + (reader.event_end((position - span.base) * BYTE) + BYTE - 1) // BYTE
         if end > span.limit or end == position:
             raise FieldError("an event goes beyond the end of the packet")
         return aligned(end, header.align)
-
-    def event_reader(self, data: memoryview, bits: int) -> EventReader:
-        """Return what reads events of a packet of so many bits field by field."""
-        return EventReader(self.trace, self.stream, data, bits)
 
 
 def largest_align(declared: Type) -> int:

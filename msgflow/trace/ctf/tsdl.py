@@ -203,15 +203,9 @@ def _clock_of(scopes: Mapping[Scope, ctf.Structure], clocks: Mapping[str, Clock]
 
 
 def _mapped_clocks(declared: ctf.Type) -> list[str]:
-    match declared:
-        case ctf.Structure(members=members):
-            return [name for member in members for name in _mapped_clocks(member.type)]
-        case ctf.Variant(choices=choices):
-            return [name for choice in choices for name in _mapped_clocks(choice.type)]
-        case ctf.Integer(roles=roles):
-            return [role.partition(".")[2] for role in roles if role.startswith("clock.")]
-        case _:
-            return []
+    if isinstance(declared, ctf.Integer):
+        return [role.partition(".")[2] for role in declared.roles if role.startswith("clock.")]
+    return [name for part in ctf.parts(declared) for name in _mapped_clocks(part)]
 
 
 def _clock(block: _Block, notes: list[str]) -> Clock:

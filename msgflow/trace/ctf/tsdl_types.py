@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 Labels = dict[str, tuple[tuple[int, int], ...]]
 Value = int | str
 
-_MOST_BITS = 64
-_MOST_ALIGN = 1 << 20
-_MOST_ELEMENTS = 1 << 40
 _BASES = dict.fromkeys(("16", "x", "hex", "hexadecimal", "p"), 16)
 _TEXT_ENCODINGS = {"utf8", "utf-8", "ascii"}
 _ABSOLUTE = (
@@ -155,7 +152,7 @@ class TypeParser(TokenStream):
         return self._checked_align(self._size_of(values, "align", default))
 
     def _checked_align(self, align: int) -> int:
-        if align < 1 or align & (align - 1) or align > _MOST_ALIGN:
+        if align < 1 or align & (align - 1) or align > ctf.MOST_ALIGN:
             raise self.error(f"an alignment of {align} bits makes no sense")
         return align
 
@@ -170,7 +167,7 @@ class TypeParser(TokenStream):
     def _integer(self) -> ctf.Integer:
         values = self._attributes()
         size = self._size_of(values, "size", None)
-        if size > _MOST_BITS:
+        if size > ctf.MOST_BITS:
             raise self.error(f"an integer of {size} bits is too large")
         encoding = str(values.get("encoding", "none"))
         return ctf.Integer(
@@ -237,7 +234,7 @@ class TypeParser(TokenStream):
         while self.take_if("["):
             if self.token.kind == "number":
                 length = self.number()
-                if length > _MOST_ELEMENTS:
+                if length > ctf.MOST_ELEMENTS:
                     raise self.error(f"an array of {length} elements makes no sense")
                 dimensions.append(length)
             else:
