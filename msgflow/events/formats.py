@@ -26,7 +26,8 @@ class EventFormat(StrEnum):
 TABLES = (EventFormat.CSV, EventFormat.PARQUET)
 """The formats with columns."""
 
-_SUFFIXES = {".txt": EventFormat.TEXT, **{f".{form}": form for form in list(EventFormat)[1:]}}
+_SUFFIXES = {".txt": EventFormat.TEXT}
+_SUFFIXES |= {f".{form}": form for form in EventFormat if form is not EventFormat.TEXT}
 
 
 def is_directory(path: Path) -> bool:

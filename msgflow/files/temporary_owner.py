@@ -32,9 +32,9 @@ def is_abandoned(text: str) -> bool:
 
 
 def left_behind(folder: Path, prefix: str, suffix: str, *, by_others: bool = False) -> list[Path]:
-    """Return the entries of a folder, named by prefix, mark and suffix, of processes that ended.
+    """Return what processes that ended left in a folder, named by prefix, mark and suffix.
 
-    `by_others` says that only this process can still use its own: those of all others count.
+    `by_others` says that no other process is at work there: what is not of this one was left.
     """
     found = []
     with contextlib.suppress(OSError):

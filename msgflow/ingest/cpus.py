@@ -86,9 +86,11 @@ class Cpus:
             latest.before(groups, _repeated(batches, groups, is_of), events)
             for is_of, latest in zip(of_kinds, self._handlings, strict=True)
         ]
+        # An interrupt is being handled if it has begun behind the latest switch, and not ended.
         is_open = np.array(
             [(one["is_open"] == 1) & (one["event_id"] > switch["event_id"]) for one in handlings]
         ).reshape(len(handlings), -1)
+        # Of several, the one that began last.
         innermost = np.where(is_open, [one["event_id"] for one in handlings], NONE)
         interrupt = np.where(is_open.any(axis=0), innermost.argmax(axis=0), NONE).astype(np.int32)
         ends = np.cumsum([0, *(batch.num_rows for _, batch in batches)])

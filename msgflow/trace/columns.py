@@ -144,9 +144,9 @@ def paths_of(
 ) -> list[tuple[tuple[str, ...], ...]]:
     """Return for each column the paths of the fields that fill it; none: no field does.
 
-    A path is the names from the outermost structure, variant or option to the field itself. The
-    first name of a column that a field has fills it alone. Else its names have dots between those
-    of a path. Options of one variant may fill the same column, each in the events that have it.
+    A path has the names from the outermost structure, variant or option to the field itself. A
+    field that has one of the names of a column fills it alone. Otherwise each of these names is a
+    path, with dots in it. Options of one variant may fill the same column, each in its events.
     """
     types = {field.name: field.type for field in fields}
     found: list[tuple[tuple[str, ...], ...]] = []

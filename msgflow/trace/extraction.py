@@ -239,7 +239,7 @@ class Target:
 
 @contextlib.contextmanager
 def _of_one_kind(member: str) -> Iterator[None]:
-    """Say of a member that has the name of another one of another kind what it is."""
+    """Say so if a name in the archive is that of a directory and of something else."""
     try:
         yield
     except (FileExistsError, IsADirectoryError, NotADirectoryError) as error:

@@ -1,9 +1,11 @@
-"""Order of the packets of all traces: in time, without copies."""
+"""Order of the packets of all traces: in time, without copies.
+
+Packets whose headers do not have times get those of their events.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import Enum, auto
 from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf.events import find_events, read_events, say_nothing, without_absurd
@@ -84,7 +86,7 @@ def entries_of(
 
     The same packet may be given twice (a copied directory, overlapping snapshots): same trace
     uuid, stream class, stream instance and begin. The one of the first trace is read. In one
-    trace, where packets may well begin at the same time, see `Repetitions`.
+    trace, where packets may well begin at the same time, it has to be the same byte for byte.
 
     `begins` has packets that do not say when they begin: the clock's value and the time. `counter`
     has counted up to the first of these packets. `report` gets packet, byte and message for
@@ -110,7 +112,7 @@ def entries_of(
     entries = []
     counter.enter_part()
     copies = 0
-    repetitions = Repetitions()
+    seen: dict[tuple[object, ...], Packet] = {}
     repeated: dict[int, int] = {}
     positions: dict[int, int] = {}
     for order_ns, rank, begin, stream, packet in candidates:
@@ -122,8 +124,8 @@ def entries_of(
         if is_copy:
             copies += 1
             continue
-        repetition = repetitions.of(stream, packet)
-        if repetition is Repetition.SAME:
+        first = seen.setdefault(_identity(stream, packet), packet)
+        if first is not packet and _are_equal(first, packet):
             repeated[stream.trace_index] = repeated.get(stream.trace_index, 0) + 1
             continue
         position = positions.get(rank, 0)
@@ -132,46 +134,27 @@ def entries_of(
         entries.append(entry)
         if losses.problem is not None:
             report(entry, 0, losses.problem)
-        if repetition is Repetition.OTHER:
+        if first is not packet and _is_numbered(packet):
             report(entry, 0, "another packet has its stream, number and begin: both were read")
     return entries, copies, repeated
 
 
-class Repetition(Enum):
-    """What a packet is to an earlier one of its trace."""
-
-    NONE = auto()  # no packet is like it
-    SAME = auto()  # it is the same once more
-    OTHER = auto()  # another one with the same identity; one of them is damaged
+def _is_numbered(packet: Packet) -> bool:
+    return packet.header.instance is not None and packet.header.sequence is not None
 
 
-class Repetitions:
-    """Packets seen so far, to notice one that a trace holds twice, as in a copied file."""
+def _identity(stream: Stream, packet: Packet) -> tuple[object, ...]:
+    """Return what no two sound packets of a trace share, if they have numbers.
 
-    def __init__(self) -> None:
-        self._seen: dict[tuple[object, ...], Packet] = {}
-
-    def of(self, stream: Stream, packet: Packet) -> Repetition:
-        """Tell whether the packet was seen before, and remember it.
-
-        It was if one with its stream, number and begin is the same byte for byte. Packets without
-        numbers, or without the names of their streams, may well begin at the same time.
-        """
-        header = packet.header
-        key: tuple[object, ...] = (stream.trace_index, stream.class_id, header.begin)
-        is_numbered = header.instance is not None and header.sequence is not None
-        if is_numbered:
-            # Rotation leaves an empty packet in front of the first one with events.
-            is_empty = packet.content_bits <= header.events_at
-            key = (*key, header.instance, header.sequence, is_empty)
-        else:
-            key = (*key, header.end, header.cpu, header.events_at, packet.content_bits)
-        first = self._seen.setdefault(key, packet)
-        if first is packet:
-            return Repetition.NONE
-        if _are_equal(first, packet):
-            return Repetition.SAME
-        return Repetition.OTHER if is_numbered else Repetition.NONE
+    Those without numbers, or without the names of their streams, may well share it.
+    """
+    header = packet.header
+    key = (stream.trace_index, stream.class_id, header.begin)
+    if _is_numbered(packet):
+        # Rotation leaves an empty packet in front of the first one with events.
+        is_empty = packet.content_bits <= header.events_at
+        return (*key, header.instance, header.sequence, is_empty)
+    return (*key, header.end, header.cpu, header.events_at, packet.content_bits)
 
 
 def _are_equal(one: Packet, other: Packet) -> bool:

@@ -250,7 +250,7 @@ class TypeParser(TokenStream):
         return field, name
 
     def _variant(self) -> ctf.Type:
-        """Parse a variant; without a selector it only gets a name, and says it where it is used."""
+        """Parse a variant. One without a selector only gets a name: its users name the selector."""
         name = self.name() if self.token.kind == "name" else ""
         selector = ""
         if self.take_if("<"):
