@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from msgflow.trace.ctf.losses import LossCounter
     from msgflow.trace.ctf.packets import Packet, Stream
     from msgflow.trace.model import TraceInfo
+
 _CHUNK = 1 << 20
 
 
