@@ -6,7 +6,7 @@
 3. Packets are loaded in batches, and their events are found and put in order of time
    (`packet_memory`, `events`, `event_order`). Finding is the only step that goes from event to
    event.
-4. The fields of all events of one class become columns at once (`event_header`,
-   `field_columns`, `record_batch`). Whatever has no layout for that is read field by field
+4. The fields of all events of one class become columns at once (`field_columns`,
+   `record_batch`). Whatever has no layout for that is read field by field
    (`field_reader`): slower, but any type will do.
 """

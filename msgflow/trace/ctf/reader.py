@@ -14,7 +14,8 @@ from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.ctf.losses import LossCounter
 from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.packet_index import orphans
-from msgflow.trace.ctf.packet_order import begins_of, entries_of
+from msgflow.trace.ctf.packet_order import entries_of
+from msgflow.trace.ctf.packet_times import begins_of
 from msgflow.trace.ctf.packets import streams_of
 from msgflow.trace.ctf.stream_layout import StreamLayout
 from msgflow.trace.ctf.trace_info import corrected, describe

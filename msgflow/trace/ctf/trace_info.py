@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
-from msgflow.trace.ctf.packet_order import end_of
+from msgflow.trace.ctf.packet_times import end_of
 from msgflow.trace.model import TraceInfo
 
 if TYPE_CHECKING:
