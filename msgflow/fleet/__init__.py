@@ -2,5 +2,3 @@
 
 docs/fleet.md says what a lake holds and what it promises to those who read it.
 """
-
-from __future__ import annotations

@@ -19,12 +19,18 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msgflow.database import Database
+from msgflow.db.connection import connect
+from msgflow.errors import DatabaseError, MsgflowError, TraceError, UsageError
+from msgflow.fleet.file_store import S3
+from msgflow.fleet.lake import Lake
+from msgflow.fleet.part import write_part
+from msgflow.fleet.recording import fetch, look_at
+from msgflow.fleet.task import RESULT, STAGE, Outcome, Reason, Task, without_secrets
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from msgflow.fleet.task import Outcome, Task
-
-STAGE, RESULT = "stage", "result.json"
 _ORPHAN = 1
 
 
@@ -33,8 +39,6 @@ def main() -> None:
     directory = Path(sys.argv[1])
     text = sys.stdin.readline()
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    from msgflow.fleet.task import Task
-
     outcome = do(Task(**json.loads(text)), directory)
     (directory / RESULT).write_text(json.dumps(asdict(outcome)), encoding="utf-8")
 
@@ -47,8 +51,6 @@ def _end_with_parent() -> None:
 
 def do(task: Task, directory: Path) -> Outcome:
     """Fetch, ingest, check and write one recording; commit nothing."""
-    from msgflow.fleet.task import Outcome
-
     begin, stage = time.monotonic(), ""
 
     def enter(name: str) -> None:
@@ -69,12 +71,6 @@ def do(task: Task, directory: Path) -> Outcome:
 
 
 def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[str, Any]:
-    from msgflow.database import Database
-    from msgflow.fleet.file_store import S3
-    from msgflow.fleet.lake import Lake
-    from msgflow.fleet.part import write_part
-    from msgflow.fleet.recording import fetch, look_at
-
     enter("looking at the source")
     before = look_at(task.source)
     _require_space(task, directory)
@@ -127,8 +123,6 @@ def _require_space(task: Task, directory: Path) -> None:
 
 def _rename_paths(database: Path, before: str, after: str) -> None:
     """Replace the path of the local copy by the address of the source in all texts."""
-    from msgflow.db.connection import connect
-
     with contextlib.closing(connect(database, read_only=False)) as con:
         columns = con.execute(
             "SELECT table_name, column_name FROM duckdb_columns() WHERE data_type = 'VARCHAR' "
@@ -144,9 +138,6 @@ def _rename_paths(database: Path, before: str, after: str) -> None:
 
 def failed_outcome(error: Exception, stage: str, seconds: float) -> Outcome:
     """Return the outcome of a recording at which an error was raised."""
-    from msgflow.errors import DatabaseError, MsgflowError, TraceError, UsageError
-    from msgflow.fleet.task import Outcome, Reason, without_secrets
-
     message = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
     hint = None
     if isinstance(error, MsgflowError):

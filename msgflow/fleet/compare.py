@@ -8,9 +8,12 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+
 from msgflow.errors import UsageError
 from msgflow.fleet.lake_connection import Choice, Reading, choose
 from msgflow.query.compare import STATISTICS, Failure, failures, share_of
+from msgflow.query.comparison_summary import changes
 from msgflow.query.selection import CASES, CUT_COLUMN
 from msgflow.query.several_runs import compared
 from msgflow.text.name_suggestions import meant_or, nearest
@@ -37,8 +40,6 @@ class FleetComparison:
 
     def changes(self, *, only_different: bool = True) -> QueryResult:
         """Return a row for each path, the greatest change first."""
-        from msgflow.query.comparison_summary import changes
-
         return changes(self.result, only_different)
 
     def failures(self, conditions: Iterable[str]) -> list[Failure]:
@@ -85,8 +86,6 @@ def compare(
         for key, each in zip(keys, labels, strict=True)
         if each.get(by) in sides
     ]
-    import pyarrow as pa
-
     runs, sides_of_runs, units = map(list, zip(*sided, strict=True))
     table = pa.table({"run": runs, "side": sides_of_runs, "unit": units})
     wanted = pa.array([each.get(by) in sides for each in labels])

@@ -6,30 +6,27 @@ import hashlib
 import time
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+
 from msgflow.errors import DatabaseError
-from msgflow.fleet.layout import FAILURE, failure_schema
+from msgflow.fleet.layout import FAILURE, FAILURE_SCHEMA
 from msgflow.fleet.parquet import read_parquet
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import pyarrow as pa
-
     from msgflow.fleet.lake import Lake
 
 
 def read_failures(lake: Lake) -> pa.Table:
-    """Return the failed recordings: one row each, columns of `failure_schema`."""
-    import pyarrow as pa
-
-    schema = failure_schema()
-    tables = [schema.empty_table()]
+    """Return the failed recordings: one row each, columns of `FAILURE_SCHEMA`."""
+    tables = [FAILURE_SCHEMA.empty_table()]
     for entry in lake.store.entries(FAILURE, recursive=False):
         # Another process may have ingested the recording and deleted this file meanwhile.
         if entry.path.endswith(".parquet") and (content := lake.store.read(entry.path)):
             try:
-                tables.append(read_parquet(content, schema))
+                tables.append(read_parquet(content, FAILURE_SCHEMA))
             except (pa.ArrowException, OSError) as error:
                 raise DatabaseError(
                     f"cannot read a failure of the lake — {lake.store.url_of(entry.path)}",
@@ -40,11 +37,8 @@ def read_failures(lake: Lake) -> pa.Table:
 
 def write_failure(lake: Lake, values: Mapping[str, Any]) -> None:
     """Write the failure of a recording, in place of an earlier one."""
-    import pyarrow as pa
-
-    row = dict.fromkeys(failure_schema().names) | dict(values)
-    row |= {"msgflow_version": __version__, "failed_ns": time.time_ns()}
-    table = pa.Table.from_pylist([row], schema=failure_schema())
+    row = {**values, "msgflow_version": __version__, "failed_ns": time.time_ns()}
+    table = pa.Table.from_pylist([row], schema=FAILURE_SCHEMA)
     lake.put_table(_path(row["source"]), FAILURE, table, "")
 
 

@@ -21,6 +21,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 from urllib.parse import urlsplit
 
+from pyarrow.fs import (
+    AwsStandardS3RetryStrategy,
+    FileSelector,
+    FileType,
+    LocalFileSystem,
+    S3FileSystem,
+)
+
 from msgflow.errors import DatabaseError, UsageError, require_utf8
 from msgflow.files.temporary_owner import mark
 from msgflow.trace.regular_file import open_regular
@@ -46,8 +54,8 @@ _ENDPOINTS = ("AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL")
 _HOPELESS = re.compile(
     r"NETWORK_CONNECTION|ACCESS_DENIED|NO_SUCH|NOT_FOUND|INVALID|SIGNATURE|HTTP status 40[0134]"
 )
-# Nor where there is no such file, or where this machine cannot write the copy.
-_OF_THIS_MACHINE = (
+# Nor helps another try where there is no such file, or where this machine cannot write its copy.
+_HOPELESS_ERRORS = (
     errno.ENOENT, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES,
 )  # fmt: skip
 # A name of a user or a password before the host; a password may have any character.
@@ -86,8 +94,6 @@ class Store:
     @cached_property
     def filesystem(self) -> Any:
         """The `pyarrow.fs.FileSystem`; `full` gives its paths."""
-        from pyarrow.fs import LocalFileSystem
-
         return LocalFileSystem() if self.is_local else _s3()
 
     def full(self, path: str = "") -> str:
@@ -140,8 +146,6 @@ class Store:
 
     def entries(self, path: str = "", *, recursive: bool = True) -> list[Entry]:
         """Return the files below a path, sorted; an empty list if there is no such path."""
-        from pyarrow.fs import FileType
-
         files = self._found(path, FileType.File, recursive=recursive)
         if self.is_local and not self._follows_links:
             folders = {info.path.rpartition("/")[0] for info in files}
@@ -161,22 +165,16 @@ class Store:
 
     def folders(self, path: str = "") -> list[str]:
         """Return the names of the folders directly below a path, sorted."""
-        from pyarrow.fs import FileType
-
         return sorted(info.base_name for info in self._found(path, FileType.Directory))
 
     def _found(self, path: str, kind: Any, *, recursive: bool = False) -> list[Any]:
         """Return what pyarrow says of the files or folders below a path."""
-        from pyarrow.fs import FileSelector
-
         selector = FileSelector(self.full(path), allow_not_found=True, recursive=recursive)
         found = self._patiently(lambda: self.filesystem.get_file_info(selector))
         return [info for info in found if info.type == kind]
 
     def entry(self, path: str = "") -> Entry | None:
         """Return the entry of one file, None if there is no such file."""
-        from pyarrow.fs import FileType
-
         self._require_here(path)
         info = self._patiently(lambda: self.filesystem.get_file_info(self.full(path)))
         if info.type != FileType.File:
@@ -223,7 +221,7 @@ class Store:
                 try:
                     return work()
                 except OSError as error:
-                    if error.errno in _OF_THIS_MACHINE or _HOPELESS.search(str(error)):
+                    if error.errno in _HOPELESS_ERRORS or _HOPELESS.search(str(error)):
                         raise
                     time.sleep(pause * random.uniform(0.5, 1.5))
             return work()
@@ -293,8 +291,6 @@ def normal_url(url: str | Path) -> str:
 
 
 def _s3() -> Any:
-    from pyarrow.fs import AwsStandardS3RetryStrategy, S3FileSystem
-
     options: dict[str, Any] = {}
     if url := next((os.environ[name] for name in _ENDPOINTS if os.environ.get(name)), None):
         parts = urlsplit(url)

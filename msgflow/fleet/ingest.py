@@ -231,12 +231,12 @@ class _Ingest:
             return None
         item.state = found
         run = self._runs.get(self._sources.get(recording.source, ""))
-        is_relabelled = run is not None and _is_relabelled(run, recording)
-        if run is not None and is_relabelled:
+        labels = dict(recording.labels)
+        if run is not None and labels and dict(run["labels"] or ()) != labels:
             with self._lake.changing():
                 run = self._as_it_is_now(run["run"])
                 if run is not None and self._is_there(run, recording, found):
-                    self._commit({**run, "labels": dict(recording.labels)})
+                    self._commit({**run, "labels": labels})
         if run is not None and self._is_there(run, recording, found):
             self._forget(item)
             self._progress.there += 1
@@ -456,10 +456,6 @@ class _Ingest:
         self._progress.seconds = time.monotonic() - self._begin
         if self._report is not None:
             self._report(self._progress)
-
-
-def _is_relabelled(run: Mapping[str, Any], recording: Recording) -> bool:
-    return bool(recording.labels) and dict(run["labels"] or ()) != dict(recording.labels)
 
 
 def _has_changed(run: Mapping[str, Any]) -> bool:

@@ -14,6 +14,9 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+import pyarrow.parquet
+
 from msgflow.db.sandbox import open_memory
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.files.text_file import MOST_BYTES
@@ -23,14 +26,15 @@ from msgflow.fleet.layout import (
     LAKE_REVISION,
     PACKED,
     RUN,
+    RUN_SCHEMA,
     about,
     metadata,
     require_readable,
     run_path,
-    run_schema,
 )
 from msgflow.fleet.parquet import read_parquet
 from msgflow.sql.failure import first_line
+from msgflow.sql.statement import registered
 
 try:
     import fcntl
@@ -41,8 +45,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
-    import duckdb
-    import pyarrow as pa
 
 _READ_AT_ONCE = 16
 # Small groups of rows, run after run: a query of few runs reads few groups of a pack.
@@ -92,24 +94,18 @@ class Lake:
         store.put(ABOUT, about())
         return cls(store)
 
-    def runs(self, con: duckdb.DuckDBPyConnection | None = None) -> pa.Table:
-        """Return the runs that the lake holds: one row each, by key, columns of `run_schema`."""
-        import pyarrow as pa
-
-        if con is None:
-            with open_memory() as con:
-                return self.runs(con)
+    def runs(self) -> pa.Table:
+        """Return the runs that the lake holds: one row each, by key, columns of `RUN_SCHEMA`."""
         # Only a bucket makes one wait.
         with ThreadPoolExecutor(1 if self.store.is_local else _READ_AT_ONCE) as pool:
             # One that is gone by now was removed meanwhile.
             tables = [rows for rows in pool.map(self._rows, self.names()) if rows is not None]
-        # Only if needed: making an empty table imports pandas if that is installed.
-        rows = pa.concat_tables(tables).combine_chunks() if tables else run_schema().empty_table()
+        if not tables:
+            return RUN_SCHEMA.empty_table()
+        rows = pa.concat_tables(tables).combine_chunks()
         # SQL, as importing pyarrow.compute takes longer.
-        con.register("known", rows)
-        found = con.sql(_LAST).to_arrow_table()
-        con.unregister("known")
-        return pa.Table.from_arrays(found.columns, schema=rows.schema)
+        with open_memory() as con, registered(con, known=rows):
+            return pa.Table.from_arrays(con.sql(_LAST).to_arrow_table().columns, schema=rows.schema)
 
     def names(self) -> list[str]:
         """Return the names of the files of the table `run`: keys of runs, and `PACKED`."""
@@ -128,14 +124,12 @@ class Lake:
 
     def _rows(self, name: str) -> pa.Table | None:
         """Return the rows of a file of the table `run`, None if there is no such file."""
-        import pyarrow as pa
-
         url = self.store.url_of(run_path(name))
         content = self.store.read(run_path(name))
         if content is None:
             return None
         try:
-            rows = read_parquet(content, run_schema())
+            rows = read_parquet(content, RUN_SCHEMA)
         except (pa.ArrowException, OSError) as error:
             raise DatabaseError(
                 f"cannot read the runs of the lake: {first_line(error)} — {url}",
@@ -160,14 +154,9 @@ class Lake:
         self._put_runs(PACKED, rows)
 
     def _put_runs(self, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
-        import pyarrow as pa
-
-        whole = [
-            dict.fromkeys(run_schema().names) | dict(row) | {"lake_revision": LAKE_REVISION}
-            for row in rows
-        ]
-        table = pa.Table.from_pylist(whole, schema=run_schema())
-        revision = max((row["schema_revision"] or "" for row in whole), default="")
+        whole = [{**row, "lake_revision": LAKE_REVISION} for row in rows]
+        table = pa.Table.from_pylist(whole, schema=RUN_SCHEMA)
+        revision = max((row.get("schema_revision") or "" for row in whole), default="")
         self.put_table(run_path(name), RUN, table, revision)
 
     def remove(self, keys: Iterable[str], *, of: str | None = None) -> int:
@@ -203,9 +192,6 @@ class Lake:
 
     def put_table(self, path: str, table_name: str, table: pa.Table, revision: str) -> None:
         """Write a table as one file."""
-        import pyarrow as pa
-        import pyarrow.parquet
-
         # The schema has the descriptions of columns, which the table may lack.
         schema = table.schema.with_metadata(metadata(table_name, revision))
         sink = pa.BufferOutputStream()

@@ -17,11 +17,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import duckdb
+import pyarrow as pa
+import pyarrow.parquet as pq
 
 from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.sql_guard import require_condition
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.fleet.answers import answers
+from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.layout import RUN, VIEWS, part_path, view_path
 from msgflow.fleet.part import KEY, PART, public_views, view_rows, write_rows
 from msgflow.fleet.run_database import run_database
@@ -32,8 +34,6 @@ from msgflow.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-
-    import pyarrow as pa
 
     from msgflow.fleet.lake import Lake
 
@@ -49,23 +49,21 @@ class Choice:
     """Runs of a lake, some or all."""
 
     lake: Lake
-    runs: pa.Table  # the chosen ones, one row each, ordered by key; columns of `run_schema`
+    runs: pa.Table  # the chosen ones, one row each, ordered by key; columns of `RUN_SCHEMA`
     labels: tuple[str, ...]  # keys of the labels of all runs of the lake, sorted
     total: int  # number of runs of the lake
 
 
 def choose(lake: Lake, where: str | None = None) -> Choice:
     """Return the runs of a lake that fit a condition."""
-    with open_memory() as con:
-        shut_in(con)
-        runs = lake.runs(con)
-        if not len(runs):
-            raise UsageError(f"the lake holds no run yet — {lake.store.url}", _NONE_YET)
-        labels = tuple(
-            sorted({key for pairs in runs["labels"].to_pylist() for key, _ in pairs or ()})
-        )
-        chosen = runs
-        if where is not None:
+    runs = lake.runs()
+    if not len(runs):
+        raise UsageError(f"the lake holds no run yet — {lake.store.url}", _NONE_YET)
+    labels = tuple(sorted({key for pairs in runs["labels"].to_pylist() for key, _ in pairs or ()}))
+    chosen = runs
+    if where is not None:
+        with open_memory() as con:
+            shut_in(con)
             require_condition(con, where, _EXAMPLE)
             chosen = _fitting(con, runs, labels, where)
     if not len(chosen):
@@ -86,8 +84,6 @@ def label_columns(labels: Sequence[str], columns: Sequence[str]) -> list[str]:
 def _fitting(
     con: duckdb.DuckDBPyConnection, runs: pa.Table, labels: Sequence[str], where: str
 ) -> pa.Table:
-    import pyarrow as pa
-
     con.register("known_run", runs)
     named = label_columns(labels, runs.column_names)
     columns = [f"labels[$label_{n}] AS {identifier(key)}" for n, key in enumerate(named)]
@@ -161,7 +157,7 @@ class Reading(ExitStack):
         made = self._made(tables, listed)
         if tables is None or listed:
             views = {f"{VIEWS}/{name}" for name in self.choice.lake.store.folders(VIEWS)}
-            tables = [*(answer.table for answer in answers()), *sorted(views | made.keys())]
+            tables = [*ANSWERS, *sorted(views | made.keys())]
         for table in tables:
             is_view = table.startswith(f"{VIEWS}/")
             found = self._files(table, "view_part" if is_view else "part")
@@ -220,7 +216,7 @@ class Reading(ExitStack):
         }
         there = {entry.path for entry in self.choice.lake.store.entries(table, recursive=False)}
         have_it = {version for path, version in wanted.items() if path in there}
-        if table in {answer.table for answer in answers()}:
+        if table in ANSWERS:
             have_it.add(__version__)
         for path, version in sorted(wanted.items()):
             if path not in there and version in have_it:
@@ -238,9 +234,8 @@ class Reading(ExitStack):
         paths = [store.full(path) for path in files]
         if store.is_local:
             return self._local_scan(name, paths)
-        import pyarrow as pa
+        # Only here: it imports pandas, if that is installed.
         import pyarrow.dataset as ds
-        import pyarrow.parquet as pq
 
         system = store.filesystem
         # Files of one version have the same columns.

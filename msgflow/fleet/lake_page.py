@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+import pyarrow.compute as pc
+
 from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
 from msgflow.fleet.lake_connection import Reading, choose, lake_errors
@@ -16,8 +19,6 @@ from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    import pyarrow as pa
 
     from msgflow.fleet.lake import Lake
     from msgflow.result.query_result import QueryResult
@@ -118,9 +119,6 @@ def _encoded(result: QueryResult, command: str) -> bytes:
 
 
 def _with_time(failures: pa.Table) -> pa.Table:
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     moments = pc.cast(failures["failed_ns"], pa.timestamp("ns"))
     texts = pc.strftime(pc.cast(moments, pa.timestamp("s"), safe=False), "%Y-%m-%d %H:%M:%S")
     names = ["source", "reason", "error", "hint", "labels", "stage", "tries", "worker"]
@@ -129,7 +127,5 @@ def _with_time(failures: pa.Table) -> pa.Table:
 
 def _frame(lake: Lake, runs: pa.Table) -> pa.Table:
     """Return the row that the head of a page shows; here it names the lake."""
-    import pyarrow as pa
-
     name = lake.store.url.rstrip("/").rpartition("/")[2] or lake.store.url
     return pa.table({"run_id": [0], "name": [name], "start_text": ["0"], "runs": [len(runs)]})

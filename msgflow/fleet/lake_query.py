@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import duckdb
+import pyarrow as pa
 
 from msgflow.database import guarded_rows, sql_error
 from msgflow.errors import DatabaseError, QueryError, UsageError
-from msgflow.fleet.answers import answers
+from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.lake_connection import Reading, choose, lake_errors, what_there_is
 from msgflow.fleet.layout import VIEWS
 from msgflow.query.catalogue import choose_query, load_query, queries_meant
@@ -174,8 +175,6 @@ def fleet_worst(
     lake: Lake, path: str, *, where: str | None = None, limit: int = DEFAULT_LIMIT
 ) -> QueryResult:
     """Return the slowest flows of a path, each with the command that opens it."""
-    import pyarrow as pa
-
     header = statements().header(WORST)
     choice = choose(lake, where)
     with Reading(choice, _tables(header)) as reading:
@@ -216,7 +215,7 @@ def _command(lake: Lake, row: Mapping[str, Any]) -> str | None:
 
 def _tables(header: Header) -> list[str]:
     read = relations_of(statements().text(header.name.partition(".")[2]))
-    return sorted(read & {answer.table for answer in answers()})
+    return sorted(read & ANSWERS.keys())
 
 
 def _require_tables(reading: Reading, header: Header) -> None:
@@ -229,7 +228,7 @@ def _require_tables(reading: Reading, header: Header) -> None:
 
 
 def _named_tables(text: str) -> list[str]:
-    known = {answer.table for answer in answers()}
+    known = ANSWERS.keys()
     words = set(re.findall(r"\w+", text.lower()))
     return [name for name in sorted(known) if name in words] + (
         [f"{VIEWS}/{word}" for word in sorted(words)] if VIEWS in words else []

@@ -8,14 +8,11 @@ from __future__ import annotations
 import json
 import re
 import secrets
-from functools import cache
-from typing import TYPE_CHECKING
+
+import pyarrow as pa
 
 from msgflow.errors import DatabaseError
 from msgflow.version import __version__
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 LAKE_REVISION = 2
 ABOUT = "lake.json"
@@ -113,60 +110,48 @@ def metadata(table: str, schema_revision: str) -> dict[str, str]:
     }
 
 
-@cache
-def run_schema() -> pa.Schema:
-    """Return the columns of the table `run`, each with its meaning."""
-    import pyarrow as pa
-
-    columns = [
-        ("run", pa.string(), "Key of the run, made of the identity of its packets"),
-        ("part", pa.string(), "Where its answers lie: TABLE/PART.parquet"),
-        ("view_part", pa.string(), "Where its views lie: view/VIEW/PART.parquet; NULL: nowhere"),
-        ("database_part", pa.string(), "Where its database lies: database/PART…; NULL: nowhere"),
-        ("name", pa.string(), "Name of the run, from that of its source"),
-        ("source", pa.string(), "Path or address that it was read from"),
-        ("source_signature", pa.string(), "Names, sizes and times of the files there, as a hash"),
-        ("labels", pa.map_(pa.string(), pa.string()), "What was said of it: robot, version, …"),
-        ("start_ns", pa.int64(), "First event of any trace but kernel traces [epoch ns]"),
-        ("end_ns", pa.int64(), "Last event of any trace but kernel traces [epoch ns]"),
-        ("event_count", pa.int64(), "Events read"),
-        ("source_bytes", pa.int64(), "Size of the source"),
-        ("options", pa.string(), "Options of the ingest, as JSON"),
-        ("msgflow_version", pa.string(), "Version of msgflow that read it"),
-        ("schema_revision", pa.string(), "Revision of the tables and views"),
-        ("lake_revision", pa.int32(), "Revision of the layout of the lake"),
-        ("seconds", pa.float64(), "How long fetching, ingesting and writing took"),
-        ("tries", pa.int32(), "How often it was tried"),
-        ("worker", pa.string(), "Machine that did it"),
-        ("committed_ns", pa.int64(), "When the run was put here [epoch ns]; the last counts"),
-    ]
-    return _schema(columns)
-
-
-@cache
-def failure_schema() -> pa.Schema:
-    """Return the columns of the table `fleet_failure`, each with its meaning."""
-    import pyarrow as pa
-
-    columns = [
-        ("source", pa.string(), "Path or address of the recording"),
-        ("source_signature", pa.string(), "Names, sizes and times of the files there, as a hash"),
-        ("labels", pa.map_(pa.string(), pa.string()), "What was said of it"),
-        ("reason", pa.string(), "What kind of failure, see docs/fleet.md"),
-        ("stage", pa.string(), "What was being done"),
-        ("error", pa.string(), "What went wrong, in words"),
-        ("hint", pa.string(), "What to do about it; NULL: nothing is known"),
-        ("tries", pa.int32(), "How often it was tried"),
-        ("worker", pa.string(), "Machine of the last try"),
-        ("msgflow_version", pa.string(), "Version of msgflow that tried"),
-        ("failed_ns", pa.int64(), "When the last try failed [epoch ns]"),
-    ]
-    return _schema(columns)
-
-
-def _schema(columns: list[tuple[str, pa.DataType, str]]) -> pa.Schema:
-    import pyarrow as pa
-
+def _schema(*columns: tuple[str, pa.DataType, str]) -> pa.Schema:
+    """Return columns, each with its meaning."""
     return pa.schema(
         [pa.field(name, kind, metadata={"description": text}) for name, kind, text in columns]
     )
+
+
+RUN_SCHEMA = _schema(
+    ("run", pa.string(), "Key of the run, made of the identity of its packets"),
+    ("part", pa.string(), "Where its answers lie: TABLE/PART.parquet"),
+    ("view_part", pa.string(), "Where its views lie: view/VIEW/PART.parquet; NULL: nowhere"),
+    ("database_part", pa.string(), "Where its database lies: database/PART…; NULL: nowhere"),
+    ("name", pa.string(), "Name of the run, from that of its source"),
+    ("source", pa.string(), "Path or address that it was read from"),
+    ("source_signature", pa.string(), "Names, sizes and times of the files there, as a hash"),
+    ("labels", pa.map_(pa.string(), pa.string()), "What was said of it: robot, version, …"),
+    ("start_ns", pa.int64(), "First event of any trace but kernel traces [epoch ns]"),
+    ("end_ns", pa.int64(), "Last event of any trace but kernel traces [epoch ns]"),
+    ("event_count", pa.int64(), "Events read"),
+    ("source_bytes", pa.int64(), "Size of the source"),
+    ("options", pa.string(), "Options of the ingest, as JSON"),
+    ("msgflow_version", pa.string(), "Version of msgflow that read it"),
+    ("schema_revision", pa.string(), "Revision of the tables and views"),
+    ("lake_revision", pa.int32(), "Revision of the layout of the lake"),
+    ("seconds", pa.float64(), "How long fetching, ingesting and writing took"),
+    ("tries", pa.int32(), "How often it was tried"),
+    ("worker", pa.string(), "Machine that did it"),
+    ("committed_ns", pa.int64(), "When the run was put here [epoch ns]; the last counts"),
+)
+"""The columns of the table `run`."""
+
+FAILURE_SCHEMA = _schema(
+    ("source", pa.string(), "Path or address of the recording"),
+    ("source_signature", pa.string(), "Names, sizes and times of the files there, as a hash"),
+    ("labels", pa.map_(pa.string(), pa.string()), "What was said of it"),
+    ("reason", pa.string(), "What kind of failure, see docs/fleet.md"),
+    ("stage", pa.string(), "What was being done"),
+    ("error", pa.string(), "What went wrong, in words"),
+    ("hint", pa.string(), "What to do about it; NULL: nothing is known"),
+    ("tries", pa.int32(), "How often it was tried"),
+    ("worker", pa.string(), "Machine of the last try"),
+    ("msgflow_version", pa.string(), "Version of msgflow that tried"),
+    ("failed_ns", pa.int64(), "When the last try failed [epoch ns]"),
+)
+"""The columns of the table `fleet_failure`."""

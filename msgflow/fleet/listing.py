@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import pyarrow as pa
+
 from msgflow.fleet.failure import read_failures
 from msgflow.result.query_result import QueryResult
 
 if TYPE_CHECKING:
-    import pyarrow as pa
-
     from msgflow.fleet.lake import Lake
 
 _OF_RUNS = (
@@ -39,8 +39,6 @@ def list_failures(lake: Lake) -> QueryResult:
 
 
 def _written_out(table: pa.Table) -> pa.Table:
-    import pyarrow as pa
-
     place = table.column_names.index("labels")
     labels = [
         [f"{key}={value}" for key, value in pairs] if pairs else None

@@ -5,8 +5,9 @@ from __future__ import annotations
 import csv
 import io
 import json
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+import pyarrow as pa
 
 from msgflow.db.runs import require_label
 from msgflow.errors import UsageError
@@ -16,20 +17,14 @@ from msgflow.fleet.parquet import read_parquet
 from msgflow.fleet.recording import Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
 SUFFIXES = (".csv", ".jsonl", ".parquet")
 PATH = "path"
 # A recording takes some hundred bytes: this is enough for any fleet.
 _MOST_BYTES = 100 * MOST_BYTES
-
-
-@dataclass(frozen=True)
-class _Row:
-    """One row: its place, for messages, and its values as text."""
-
-    place: str
-    values: dict[str, str | None]
+# One row: its place, for messages, and its values as text.
+_Row = tuple[str, dict[str, str | None]]
 
 
 def is_manifest(source: str) -> bool:
@@ -52,28 +47,28 @@ def read_manifest(source: str) -> list[Recording]:
     if not rows:
         raise UsageError(f"the manifest is empty — {source}", "a column path, and a row for each")
     found: dict[str, tuple[Recording, str]] = {}
-    for row in rows:
-        recording = _recording(row, folder, source)
-        earlier, place = found.setdefault(recording.source, (recording, row.place))
+    for place, values in rows:
+        recording = _recording(place, values, folder, source)
+        earlier, first = found.setdefault(recording.source, (recording, place))
         if earlier != recording:
             raise UsageError(
-                f"the manifest says two things of one recording, in {place} and {row.place}"
-                f" — {row.values[PATH]}",
+                f"the manifest says two things of one recording, in {first} and {place}"
+                f" — {values[PATH]}",
                 "leave out one of the two",
             )
     return [recording for recording, _ in found.values()]
 
 
-def _recording(row: _Row, folder: str, source: str) -> Recording:
-    path = row.values.get(PATH)
+def _recording(place: str, values: Mapping[str, str | None], folder: str, source: str) -> Recording:
+    path = values.get(PATH)
     if not path:
-        raise UsageError(f"a row without a path, in {row.place} — {source}", f"fill in {PATH}")
-    labels = {key: value for key, value in row.values.items() if key != PATH and value}
+        raise UsageError(f"a row without a path, in {place} — {source}", f"fill in {PATH}")
+    labels = {key: value for key, value in values.items() if key != PATH and value}
     try:
         for key, value in labels.items():
             require_label(key, value)
     except UsageError as error:
-        raise UsageError(f"{error.message}, in {row.place} — {source}", error.hint) from error
+        raise UsageError(f"{error.message}, in {place} — {source}", error.hint) from error
     is_whole = "://" in path or path.startswith("/")
     return Recording(normal_url(path if is_whole else f"{folder}/{path}"), labels)
 
@@ -103,7 +98,7 @@ def _csv(text: str, source: str) -> Iterator[_Row]:
                     f"{len(values)} values for {len(names)} columns, in {place} — {source}",
                     "put values with commas or line breaks between quotes",
                 )
-            yield _Row(place, dict(zip(names, values, strict=True)))
+            yield place, dict(zip(names, values, strict=True))
     except csv.Error as error:
         raise UsageError(
             f"cannot read the manifest: {error}, in line {reader.line_num} — {source}",
@@ -125,19 +120,17 @@ def _jsonl(text: str, source: str) -> Iterator[_Row]:
         if not isinstance(values, dict):
             raise UsageError(f"no object, in line {number} — {source}", '{"path": "…", …}')
         _require_columns(list(values), source)
-        yield _Row(f"line {number}", {key: _text(value, key) for key, value in values.items()})
+        yield f"line {number}", {key: _text(value, key) for key, value in values.items()}
 
 
 def _parquet(content: bytes, source: str) -> Iterator[_Row]:
-    import pyarrow as pa
-
     try:
         table = read_parquet(content)
     except (pa.ArrowException, OSError) as error:
         raise UsageError(f"cannot read the manifest — {source}", "is it Parquet?") from error
     _require_columns(table.column_names, source)
     for number, values in enumerate(table.to_pylist(), 1):
-        yield _Row(f"row {number}", {key: _text(value, key) for key, value in values.items()})
+        yield f"row {number}", {key: _text(value, key) for key, value in values.items()}
 
 
 def _require_columns(names: list[str], source: str) -> None:

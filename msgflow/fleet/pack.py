@@ -12,8 +12,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+import pyarrow.compute as pc
+
 from msgflow.errors import DatabaseError
-from msgflow.fleet.answers import answers
+from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.layout import (
     DATABASE,
     PACKED,
@@ -31,8 +34,6 @@ from msgflow.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
-
-    import pyarrow as pa
 
     from msgflow.fleet.file_store import Entry
     from msgflow.fleet.lake import Lake
@@ -64,7 +65,7 @@ def pack(lake: Lake) -> Packed:
         before = dict(packed)
         packs = 0
         views = sorted({entry.path.rpartition("/")[0] for entry in lake.store.entries(VIEWS)})
-        for key, tables in (("part", [answer.table for answer in answers()]), ("view_part", views)):
+        for key, tables in (("part", [*ANSWERS]), ("view_part", views)):
             sizes = Counter[str]()
             for table in tables:
                 for entry in lake.store.entries(table):
@@ -139,9 +140,6 @@ def _together(
     lake: Lake, table: str, rows: Sequence[Mapping[str, Any]], key: str, pack: str
 ) -> pa.Table | None:
     """Return the rows of some runs, run after run; None if no part has the table."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     wanted: dict[str, list[str]] = {}
     for row in rows:
         wanted.setdefault(row[key], []).append(row["run"])
@@ -167,9 +165,6 @@ def _together(
 
 
 def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | None:
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
     content = lake.store.read(part_path(table, part))
     if content is None:
         return None
@@ -195,7 +190,7 @@ def _clean_up(lake: Lake, own: set[str], runs: Iterable[Mapping[str, Any]]) -> l
         entry for entry in lake.store.entries(RUN) if entry.path in own or part_of(entry.path) == ""
     ]
     needed = {
-        **{answer.table: {row["part"] for row in runs} for answer in answers()},
+        **{table: {row["part"] for row in runs} for table in ANSWERS},
         VIEWS: {row["view_part"] for row in runs},
         DATABASE: {row["database_part"] for row in runs},
     }

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    import pyarrow as pa
+import pyarrow as pa
+import pyarrow.parquet
 
 _LARGE = 1_000_000
 
 
 def read_parquet(content: bytes, schema: pa.Schema | None = None) -> pa.Table:
     """Return the rows of a file."""
-    import pyarrow as pa
-    import pyarrow.parquet
-
     # `read_table` would import pandas if that is installed.
     file = pyarrow.parquet.ParquetFile(pa.BufferReader(content))
     # Most files have one row: threads would cost more than they save.

@@ -9,9 +9,13 @@ from __future__ import annotations
 import shutil
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+import pyarrow.parquet
+
+from msgflow.db.connection import recorded_revision
 from msgflow.db.objects import public_names
 from msgflow.errors import TraceError
-from msgflow.fleet.answers import answers
+from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.layout import RUN, database_path, metadata, new_part, part_path, view_path
 from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
@@ -21,7 +25,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import duckdb
-    import pyarrow as pa
 
     from msgflow.fleet.file_store import Store
 
@@ -53,10 +56,6 @@ def write_part(
 
     `views` are the public views, `database` is the file of the database itself.
     """
-    import pyarrow as pa
-
-    from msgflow.db.connection import recorded_revision
-
     ((run_id, name, start_ns, end_ns, event_count),) = connection.execute(
         "SELECT run_id, name, start_ns, end_ns, event_count FROM main.run"
     ).fetchall()
@@ -65,10 +64,10 @@ def write_part(
     revision = recorded_revision(connection.cursor()) or ""
     first = {KEY: key, PART: part}
     table, compressed = scratch / "table.parquet", scratch / "compressed"
-    for answer in answers():
-        rows = answer.read(connection, run_id).to_reader(_ROWS_AT_ONCE)
-        write_rows(table, answer.table, rows, first, revision)
-        store.put(part_path(answer.table, part), table)
+    for answer, read in ANSWERS.items():
+        rows = read(connection, run_id).to_reader(_ROWS_AT_ONCE)
+        write_rows(table, answer, rows, first, revision)
+        store.put(part_path(answer, part), table)
     if views:
         for view in public_views(connection):
             write_rows(table, view, view_rows(connection, view), first, revision)
@@ -91,14 +90,6 @@ def write_part(
         "msgflow_version": __version__,
         "schema_revision": revision,
     }
-
-
-def _keyed(schema: pa.Schema) -> pa.Schema:
-    """Return the columns of a table of the lake: first the key of the run, and its part."""
-    import pyarrow as pa
-
-    rest = [field for field in schema if field.name != _RUN_ID]
-    return pa.schema([pa.field(KEY, pa.string()), pa.field(PART, pa.string()), *rest])
 
 
 def public_views(connection: duckdb.DuckDBPyConnection) -> list[str]:
@@ -125,12 +116,11 @@ def write_rows(
     file: Path, table: str, rows: pa.RecordBatchReader, first: Mapping[str, str], revision: str
 ) -> None:
     """Write rows of a run into a file, behind columns with the same value in each of them."""
-    import pyarrow as pa
-    import pyarrow.parquet
-
-    schema = _keyed(rows.schema).with_metadata(metadata(table, revision))
+    same = [pa.field(name, pa.string()) for name in first]
+    own = [field for field in rows.schema if field.name != _RUN_ID]
+    schema = pa.schema([*same, *own], metadata=metadata(table, revision))
     with pyarrow.parquet.ParquetWriter(file, schema, compression="zstd") as writer:
         for batch in rows:
-            same = [pa.repeat(pa.scalar(value), len(batch)) for value in first.values()]
-            columns = [*same, *(batch[each] for each in schema.names[len(same) :])]
+            values = [pa.repeat(pa.scalar(value), len(batch)) for value in first.values()]
+            columns = [*values, *(batch[field.name] for field in own)]
             writer.write_batch(pa.record_batch(columns, schema=schema))

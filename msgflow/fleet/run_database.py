@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+
 from msgflow.db.connection import connect
 from msgflow.db.migration import upgrade
 from msgflow.errors import DatabaseError, MsgflowError, UsageError
@@ -118,8 +120,6 @@ def _row(lake: Lake, run: str) -> dict[str, Any]:
 
 
 def _fetch(lake: Lake, row: Mapping[str, Any], target: Path) -> None:
-    import pyarrow as pa
-
     path = database_path(row["database_part"])
     if lake.store.entry(path) is None:
         raise DatabaseError(

@@ -10,6 +10,8 @@ from typing import Any
 # Variables with secrets, which messages of libraries could repeat.
 _SECRETS = ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN")
 _MEGABYTE = 1_000_000
+# Files in which the process of a task says what it is doing, and its outcome.
+STAGE, RESULT = "stage", "result.json"
 
 
 class Reason(StrEnum):

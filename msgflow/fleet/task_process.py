@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.files.temporary_owner import is_abandoned, mark
-from msgflow.fleet.child_process import RESULT, STAGE
-from msgflow.fleet.task import Outcome, Reason, Task, without_secrets
+from msgflow.fleet.task import RESULT, STAGE, Outcome, Reason, Task, without_secrets
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -22,7 +22,7 @@ from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_query import fleet_sql
-from msgflow.fleet.layout import database_path, new_part, part_path, run_schema
+from msgflow.fleet.layout import RUN_SCHEMA, database_path, new_part, part_path
 from msgflow.fleet.manifest import read_manifest
 from msgflow.fleet.pack import pack
 from msgflow.fleet.run_database import open_run
@@ -41,9 +41,9 @@ def lake(night: Lake, tmp_path: Path) -> Lake:
 
 def put_row(lake: Lake, **values: Any) -> str:
     """Write a row of the table `run` and return the address of its file."""
-    row: dict[str, Any] = dict.fromkeys(run_schema().names)
+    row: dict[str, Any] = dict.fromkeys(RUN_SCHEMA.names)
     row |= {"run": "feed", "committed_ns": 1} | values
-    lake.put_table("run/feed.parquet", "run", pa.Table.from_pylist([row], run_schema()), "0001")
+    lake.put_table("run/feed.parquet", "run", pa.Table.from_pylist([row], RUN_SCHEMA), "0001")
     return lake.store.url_of("run/feed.parquet")
 
 

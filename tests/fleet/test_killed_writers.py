@@ -15,13 +15,13 @@ import duckdb
 import pytest
 from lakes import content, copied, paths, read, rows_of
 
-from msgflow.fleet.answers import answers
+from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import PACKED, VIEWS, part_of, run_path
 from msgflow.fleet.pack import pack
 
 Row = dict[str, Any]
-_TABLES = len(answers())
+_TABLES = len(ANSWERS)
 # Ends the process by SIGKILL after so many files were written or deleted. The last one written is
 # there under its temporary name.
 _DIES = """
@@ -102,7 +102,7 @@ def test_a_pack_that_is_killed_changes_no_answer(
     assert content(lake) == before
     (part,) = set(lake.runs()["part"].to_pylist())
     assert paths(lake, "run") == {run_path(PACKED)}
-    tables = paths(lake, *(answer.table for answer in answers()))
+    tables = paths(lake, *ANSWERS)
     assert {part_of(path) for path in tables} == {part}
     assert len(paths(lake, VIEWS)) == len(lake.store.folders(VIEWS))
 

@@ -12,17 +12,17 @@ from lakes import EXAMPLE, PAGE, content, copied, paths, read, rows_of
 
 from msgflow import Database
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.fleet.answers import answers
+from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import (
     PACKED,
     RUN,
+    RUN_SCHEMA,
     VIEWS,
     part_of,
     part_path,
     run_path,
-    run_schema,
     view_path,
 )
 from msgflow.fleet.pack import pack
@@ -131,9 +131,9 @@ def test_writing_again_leaves_what_is_there(
     assert first["part"] != again["part"]
     names = {"part", "view_part", "database_part"}
     assert {**first, **dict.fromkeys(names)} == {**again, **dict.fromkeys(names)}
-    for answer in answers():
+    for table in ANSWERS:
         one, other = (
-            pq.ParquetFile(lake.store.full(part_path(answer.table, row["part"]))).read()
+            pq.ParquetFile(lake.store.full(part_path(table, row["part"]))).read()
             for row in (first, again)
         )
         assert one["part"].unique().to_pylist() in ([], [first["part"]])
@@ -183,9 +183,9 @@ def test_files_say_what_they_are(holding: tuple[Lake, Row, Row]) -> None:
 
 def test_the_page_names_all_tables_and_columns() -> None:
     lake_section = PAGE.split("### Why not")[0]
-    for answer in answers():
-        assert f"`{answer.table}`" in lake_section
-    for name in run_schema().names:
+    for table in ANSWERS:
+        assert f"`{table}`" in lake_section
+    for name in RUN_SCHEMA.names:
         assert f"`{name}`" in lake_section
 
 
@@ -264,7 +264,7 @@ def test_packing_changes_no_answer(
     assert content(lake) == before
     assert paths(lake, "run") == {run_path(PACKED)}
     views = lake.store.folders(VIEWS)
-    for key, tables in (("part", [a.table for a in answers()]), ("view_part", [VIEWS])):
+    for key, tables in (("part", [*ANSWERS]), ("view_part", [VIEWS])):
         (part,) = set(lake.runs()[key].to_pylist())
         assert {part_of(path) for path in paths(lake, *tables)} == {part}
     assert len(paths(lake, VIEWS)) == len(views) > 60
@@ -273,7 +273,7 @@ def test_packing_changes_no_answer(
     # A replaced run has a file of its own again.
     again = write(lake, databases[0], tmp_path)
     lake.commit([again])
-    answered = slice(1, 1 + len(answers()))
+    answered = slice(1, 1 + len(ANSWERS))
     assert content(lake)[answered] == before[answered]
     assert paths(lake, "run") == {run_path(PACKED), run_path(first["run"])}
     with pytest.raises(UsageError, match="no such run — packed"):

@@ -17,7 +17,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from msgflow.fleet.answers import answers
+from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import part_path
@@ -118,7 +118,7 @@ class Watcher:
 
 def row_counts(lake: Lake, run: str, part: str) -> dict[str, int]:
     """Return how many rows of each answer a run has; -1: there is no such file."""
-    tables = {answer.table: read_part(lake, answer.table, part, run) for answer in answers()}
+    tables = {table: read_part(lake, table, part, run) for table in ANSWERS}
     return {name: -1 if table is None else len(table) for name, table in tables.items()}
 
 

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from msgflow.fleet.answers import answers
+from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.layout import VIEWS, new_part, part_path
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def rows_of(lake: Lake, table: str) -> list[tuple[Any, ...]]:
 def content(lake: Lake) -> list[list[tuple[Any, ...]]]:
     """Return all runs, their answers, and the views that are there."""
     runs = "SELECT * EXCLUDE (part, view_part, committed_ns) FROM run ORDER BY run"
-    tables = [_ROWS.format(table=answer.table) for answer in answers()]
+    tables = [_ROWS.format(table=name) for name in ANSWERS]
     views = [_OF_VIEW.format(table=f"{VIEWS}/{view}") for view in lake.store.folders(VIEWS)]
     return _answers(lake, runs, *tables, *views)
 
@@ -66,15 +66,13 @@ def copied(lake: Lake, row: dict[str, Any], key: str, slower: int = 1) -> dict[s
         What `run` is to have: no views and no database.
     """
     copy = {**row, "run": key, "part": new_part(key), "view_part": None, "database_part": None}
-    for answer in answers():
-        table = pq.ParquetFile(lake.store.full(part_path(answer.table, row["part"]))).read()
+    for answer in ANSWERS:
+        table = pq.ParquetFile(lake.store.full(part_path(answer, row["part"]))).read()
         for name in ("run", "part"):
             table = _with(table, name, pa.array([copy[name]] * len(table), pa.string()))
-        if answer.table == "flow":
+        if answer == "flow":
             table = _with(table, "latency_ns", pc.multiply(table["latency_ns"], slower))
-        lake.put_table(
-            part_path(answer.table, copy["part"]), answer.table, table, row["schema_revision"]
-        )
+        lake.put_table(part_path(answer, copy["part"]), answer, table, row["schema_revision"])
     return copy
 
 
