@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 import tomllib
-from bisect import bisect_left
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -18,7 +17,7 @@ from msgflow.files.text_file import read_text
 from msgflow.files.yaml_file import YamlFile, line_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
 METHODS = ("none", "messages")
 _FIELDS = ("offset_ns", "drift_ppb", "reference_ns", "uncertainty_ns")
@@ -108,7 +107,7 @@ def _toml(text: str, sync: ClockSync) -> Iterator[_Entry]:
             name,
             line,
             {
-                key: (_toml_scalar(field), _at_or_after(lines.get(key, ()), line))
+                key: (_toml_scalar(field), next((n for n in lines.get(key, ()) if n >= line), line))
                 for key, field in fields.items()
             },
         )
@@ -123,11 +122,6 @@ def _toml_lines(text: str) -> dict[str, list[int]]:
     return found
 
 
-def _at_or_after(lines: Sequence[int], first: int) -> int:
-    at = bisect_left(lines, first)
-    return lines[at] if at < len(lines) else first
-
-
 def _toml_scalar(value: object) -> str:
     if isinstance(value, int) and not isinstance(value, bool):
         # Python refuses to write out numbers that no clock has.
@@ -139,21 +133,17 @@ def _yaml(text: str, path: Path, sync: ClockSync) -> Iterator[_Entry]:
     root = YamlFile(path, _EXAMPLE, _EXAMPLE, text).root()
     if root is None:
         return
-    for name, value in _pairs(sync, root, "the file is not a mapping from hosts to offsets"):
+    if root.id != "mapping":
+        sync.fail(line_of(root), "the file is not a mapping from hosts to offsets", _EXAMPLE)
+    for name, value in root.value:
         fields = {"offset_ns": (_scalar(value), line_of(value if _scalar(value) else name))}
         if value.id == "mapping":
             fields = {}
-            for key, field in _pairs(sync, value, ""):
+            for key, field in value.value:
                 if _scalar(key) in fields:
                     sync.fail(line_of(key), f"{_scalar(key)} is given twice")
                 fields[_scalar(key)] = (_scalar(field), line_of(field if _scalar(field) else key))
         yield _scalar(name), line_of(name), fields
-
-
-def _pairs(sync: ClockSync, node: Any, what: str) -> list[tuple[Any, Any]]:
-    if node.id != "mapping":
-        sync.fail(line_of(node), what, _EXAMPLE)
-    return list(node.value)
 
 
 def _scalar(node: Any) -> str:

@@ -29,20 +29,6 @@ class Session:
     is_snapshot: bool  # it keeps the last events in memory, and writes them when asked
 
 
-@dataclass(frozen=True, slots=True)
-class Provider:
-    """A process that has tracepoints."""
-
-    pid: int
-    program: str  # its command line, as the kernel has it
-    tracepoints: frozenset[str]  # their names
-
-    @property
-    def is_ros(self) -> bool:
-        """Whether it has the tracepoints of ROS 2."""
-        return any(name.startswith("ros2:") for name in self.tracepoints)
-
-
 def lttng(*arguments: str) -> ElementTree.Element:
     """Run `lttng` with the arguments and return what it says; it never starts a daemon."""
     command = ["lttng", "--no-sessiond", "--mi", "xml", *arguments]
@@ -103,17 +89,14 @@ def sessions() -> list[Session]:
     ]
 
 
-def providers() -> list[Provider]:
-    """Return the processes with tracepoints that are connected to the daemon."""
-    return [
-        Provider(
-            int(_text(process, "id")),
-            _text(process, "name"),
-            frozenset(_text(event, "name") for event in process.iterfind(".//{*}event")),
-        )
-        for process in lttng("list", "--userspace").iterfind(".//{*}pid")
-        if process.find("{*}id") is not None
-    ]
+def ros_processes() -> list[tuple[str, int]]:
+    """Return the processes with tracepoints of ROS 2: command line and pid of each."""
+    found = []
+    for process in lttng("list", "--userspace").iterfind(".//{*}pid"):
+        names = [_text(event, "name") for event in process.iterfind(".//{*}event")]
+        if any(name.startswith("ros2:") for name in names):
+            found.append((_text(process, "name"), int(_text(process, "id"))))
+    return found
 
 
 def losses(session: str) -> int:

@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING
 from msgflow.errors import RecordingError
 from msgflow.record.daemon import session_daemon
 from msgflow.record.event_cost import measure_event_cost
-from msgflow.record.lttng import losses, providers, sessions
+from msgflow.record.lttng import losses, ros_processes, sessions
 from msgflow.record.profile import recorded_samples, with_python_functions
 from msgflow.record.program import Program, require_program
 from msgflow.record.python_path import with_python_nodes
@@ -229,7 +229,7 @@ class _Watch:
             )
         if self.expects_nodes and passed >= _UNTIL_FIRST_NODE:
             self.expects_nodes = False
-            if not any(provider.is_ros for provider in providers()):
+            if not ros_processes():
                 self.note(
                     f"after {passed:.0f} s no process has the tracepoints of ROS 2: is tracing"
                     " built in (ros2 run tracetools status), are nodes running?"
@@ -280,12 +280,12 @@ def _require_room(directory: Path, note: Callable[[str], None], seconds: float |
 
 def _note_running(note: Callable[[str], None]) -> None:
     try:
-        running = [provider for provider in providers() if provider.is_ros]
+        running = ros_processes()
     except RecordingError as error:
         note(f"it is not known what runs already: {error.message}")
         return
     if running:
-        first = f"{running[0].program} ({running[0].pid})"
+        command, pid = running[0]
         others = f" and {len(running) - 1} more" if len(running) > 1 else ""
         kept = next((session.name for session in sessions() if session.is_snapshot), None)
         cure = (
@@ -294,6 +294,6 @@ def _note_running(note: Callable[[str], None]) -> None:
             else f"--dual {shlex.quote(kept)} has them"
         )
         note(
-            f"{first}{others} of ROS 2 run already: the names of their nodes and topics are not"
-            f" recorded; {cure}"
+            f"{command} ({pid}){others} of ROS 2 run already: the names of their nodes and topics"
+            f" are not recorded; {cure}"
         )

@@ -53,7 +53,7 @@ class Slice:
     @property
     def has_window(self) -> bool:
         """Whether it limits the time."""
-        return not self.start is self.end is None
+        return self.start is not None or self.end is not None
 
     def runs(self, connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
         """Return the runs, none if the database holds none.

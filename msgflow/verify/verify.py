@@ -8,6 +8,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import load_query
 from msgflow.query.doubt_notes import AMBIGUOUS
@@ -18,8 +20,9 @@ from msgflow.run.slice import Slice
 from msgflow.sql.header import Column, Header, Param
 from msgflow.text.name_suggestions import did_you_mean
 from msgflow.verify.condition import format_value
+from msgflow.verify.junit import junit_xml
 from msgflow.verify.metrics import ENDS, PATH, SUBJECTS
-from msgflow.verify.worst_case import KEYS, LOST_FLOW, WorstCase, find_worst_case, worst_case_of
+from msgflow.verify.worst_case import KEYS, LOST_FLOW, find_worst_case, worst_case_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -118,8 +121,6 @@ class Verification:
 
     def to_junit(self, *, allow_not_measured: bool = False) -> str:
         """Return the verdicts as JUnit XML: one without a value is an error, or skipped."""
-        from msgflow.verify.junit import junit_xml
-
         return junit_xml(self.result, self.run, allow_not_measured=allow_not_measured)
 
 
@@ -150,8 +151,6 @@ def verify(
     ]
     # Failures come first; otherwise the order of the file stays.
     rows.sort(key=lambda row: _ORDER.index(row["verdict"]))
-    import pyarrow as pa
-
     types = {"VARCHAR": pa.string(), "DOUBLE": pa.float64(), "BIGINT": pa.int64()}
     schema = pa.schema([(column.name, types[column.type]) for column in _COLUMNS])
     notes = list(work.notes)
@@ -276,12 +275,12 @@ class _Work:
         # It is made of links that may be other ones.
         doubted = row.get(AMBIGUOUS)
         doubt = f"values by links that may be other ones: {doubted:,}" if doubted else None
-        worst: WorstCase | None = None
+        found = self._verdict(target, requirement)
         if value is not None:
             verdict = Verdict.PASSED if condition.holds(value) else Verdict.FAILED
             if condition.is_exceeded_by(value) and metric.worst:
-                worst = self._worst(target, metric.worst, row["subject"], row[f"key_{place}"])
-        return self._verdict(target, requirement) | {
+                found |= self._worst(target, metric.worst, row["subject"], row[f"key_{place}"])
+        return found | {
             "verdict": verdict,
             "subject": target.name if target.kind == PATH else row["subject"],
             "path": row["subject"] if target.kind == PATH else None,
@@ -289,9 +288,6 @@ class _Work:
             "value": value,
             "samples": row[f"samples_{place}"],
             "reason": (metric.lacking or metric.missing) if value is None else doubt,
-            "worst_ns": worst.duration_ns if worst else None,
-            "worst_at_ns": worst.at_ns if worst else None,
-            "see": worst.command if worst else None,
         }
 
     def _missing(self, target: Target, requirement: Requirement) -> dict[str, Any]:
@@ -325,12 +321,12 @@ class _Work:
             "line": requirement.line,
         }
 
-    def _worst(self, target: Target, kind: str, subject: str, key: Any) -> WorstCase | None:
+    def _worst(self, target: Target, kind: str, subject: str, key: Any) -> dict[str, Any]:
         if kind in ("flow", "first_flow", "last_flow"):
             return worst_case_of([*key, "take"])
         if kind == "lost_flow":
             rows = self._ask("flows", LOST_FLOW, target, {"subject": subject})
-            return worst_case_of(list(rows[0].values())) if rows else None
+            return worst_case_of(list(rows[0].values())) if rows else {}
         return find_worst_case(self.connection, kind, key, self.window)
 
 

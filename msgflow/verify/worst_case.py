@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from msgflow.sql.statement import internal_sql
@@ -14,15 +13,6 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.run.window import Window
-
-
-@dataclass(frozen=True)
-class WorstCase:
-    """The worst case."""
-
-    duration_ns: int | None  # how long it took; None if it did not end
-    at_ns: int  # when it began, epoch ns
-    command: str  # the command that shows it
 
 
 # The key of a row of the measuring query, by kind of worst case. The longest flow is in that row
@@ -49,11 +39,11 @@ ORDER BY root_ns, root_id LIMIT 1
 
 def find_worst_case(
     connection: duckdb.DuckDBPyConnection, kind: str, key: Any, window: Window
-) -> WorstCase | None:
-    """Return the worst case of a kind; None if nothing was measured."""
+) -> dict[str, Any]:
+    """Return the worst case of a kind; nothing if nothing was measured."""
     asked = {"key": key, **window.bindings}
     rows = internal_sql().run(connection, f"worst_{kind}", asked).fetchall()
-    return worst_case_of(rows[0]) if rows else None
+    return worst_case_of(rows[0]) if rows else {}
 
 
 def take_of(command: str | None) -> int | None:
@@ -64,8 +54,8 @@ def take_of(command: str | None) -> int | None:
     return None
 
 
-def worst_case_of(row: Sequence[Any]) -> WorstCase:
-    """Return the worst case in a row of such a statement."""
+def worst_case_of(row: Sequence[Any]) -> dict[str, Any]:
+    """Return columns of a verdict: the worst case in a row of such a statement."""
     duration, at_ns, identity, kind = row
     words = ["msgflow", "flow", f"--{kind.replace('_', '-')}", str(identity)]
-    return WorstCase(duration, at_ns, shlex.join(words))
+    return {"worst_ns": duration, "worst_at_ns": at_ns, "see": shlex.join(words)}

@@ -76,32 +76,23 @@ class _Told:
         return is_later or (worst_ns or 0) > self.worst_ns
 
 
+@dataclass
 class Alarm:
     """The targets, and which of them were met since the begin."""
 
-    def __init__(
-        self,
-        targets: TargetsFile,
-        paths: Mapping[str, Mapping[str, Sequence[str]]],
-        note: Callable[[str], None],
-        *,
-        with_flows: bool = False,
-    ) -> None:
-        """Start without a verdict.
+    targets: TargetsFile
+    # Places of the named paths of the requirements, as `verify` takes them.
+    paths: Mapping[str, Mapping[str, Sequence[str]]]
+    # Gets a sentence about each requirement that had data and has none any more.
+    note: Callable[[str], None]
+    with_flows: bool = False  # also ask what became of the flows of paths
 
-        `paths` are places of the named paths of the requirements, as `verify` takes them. `note`
-        gets a sentence about each requirement that had data and has none any more. `with_flows`
-        also asks what became of the flows of paths.
-        """
-        self._targets = targets
-        self._with_flows = with_flows
+    def __post_init__(self) -> None:
         self._places = {
             target.name: {field: text.value for field, text in target.chosen.items()}
-            for target in targets.targets
+            for target in self.targets.targets
             if target.kind == ENDS
         }
-        self._paths = paths
-        self._say = note
         # By (target, metric, condition).
         self._verdicts: dict[tuple[str, str, str], Verdict] = {}
         self._failing: dict[tuple[Any, ...], _Told] = {}
@@ -127,12 +118,12 @@ class Alarm:
         asked for.
         """
         part = Slice(start=window.start_ns, end=window.end_ns)
-        rows = verify(con, self._targets, part, paths=self._paths).result.table.to_pylist()
+        rows = verify(con, self.targets, part, paths=self.paths).result.table.to_pylist()
         found: list[Row] = []
         failing = {}
         culprits: list[Row] | None = None
         for row in rows:
-            self._note(row)
+            self._remember(row)
             row |= dict.fromkeys(_CAUSES) | {"flows": self._flows(con, row, part)}
             if row["verdict"] != Verdict.FAILED:
                 continue
@@ -152,7 +143,7 @@ class Alarm:
 
     def _flows(self, con: duckdb.DuckDBPyConnection, row: Row, part: Slice) -> Row | None:
         """Return `median_ns`, `p99_ns`, `lost` and `dropped` of a path, or between two topics."""
-        if not self._with_flows or row["subject"] is None:
+        if not self.with_flows or row["subject"] is None:
             return None
         if row["path"] is not None:
             query, subject, prefix, ends = "e2e-latency", row["path"], "", _ends(row["path"])
@@ -168,7 +159,7 @@ class Alarm:
                 return numbers | {name: each[name] for name in ("lost", "dropped")}
         return None
 
-    def _note(self, row: Row) -> None:
+    def _remember(self, row: Row) -> None:
         key, verdict = _key(row), Verdict(row["verdict"])
         before = self._verdicts.get(key, verdict)
         self._verdicts[key] = min(before, verdict, key=_STRONGEST.index)
@@ -181,7 +172,7 @@ class Alarm:
             had_data = self._verdicts[_key(row)] in (Verdict.FAILED, Verdict.PASSED)
             if had_data and _key(row) in silent - self._silent:
                 name = row["subject"] or row["target"]
-                self._say(f"no data of {name}: {row['metric']} {row['condition']}: {row['reason']}")
+                self.note(f"no data of {name}: {row['metric']} {row['condition']}: {row['reason']}")
         self._silent = silent
 
     @staticmethod

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import socket
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
@@ -25,26 +24,12 @@ _LEVELS = {
 }
 
 
-@dataclass(frozen=True)
-class Status:
-    """What is said of a target."""
+def _status(rows: list[dict[str, Any]], lag_s: float | None) -> tuple[str, str, dict[str, str]]:
+    """Return level, message and values of a target, which has rows of verdicts.
 
-    target: str  # what the file calls it
-    level: str  # 'OK', 'WARN', 'ERROR' or 'STALE'
-    message: str  # what is required and measured; of what fails also the path, and what is to blame
-    # 'p50', 'p99' and 'lost' (flows lost or dropped) where it is about flows; and 'lag'.
-    values: dict[str, str]
-
-
-def statuses(report: WindowReport) -> list[Status]:
-    """Return a status for each target that a window was judged by."""
-    by_target: dict[str, list[dict[str, Any]]] = {}
-    for row in report.judged:
-        by_target.setdefault(row["target"], []).append(row)
-    return [_status(target, rows, report.lag_s) for target, rows in by_target.items()]
-
-
-def _status(target: str, rows: list[dict[str, Any]], lag_s: float | None) -> Status:
+    The message has what is required and measured, and of what fails also the path and what is to
+    blame. Values are 'p50', 'p99' and 'lost' (flows lost or dropped) of flows; and 'lag'.
+    """
     worst = min((Verdict(row["verdict"]) for row in rows), key=[*_LEVELS].index)
     blamed = [row for row in rows if row["verdict"] == worst]
     values = {}
@@ -57,7 +42,7 @@ def _status(target: str, rows: list[dict[str, Any]], lag_s: float | None) -> Sta
         values["lost"] = str(flows["lost"] + flows["dropped"])
     if lag_s is not None:
         values["lag"] = f"{lag_s:.1f} s"
-    return Status(target, _LEVELS[worst], "; ".join(map(_sentence, blamed)), values)
+    return _LEVELS[worst], "; ".join(map(_sentence, blamed)), values
 
 
 def _sentence(row: dict[str, Any]) -> str:
@@ -97,20 +82,25 @@ class Diagnostics:
         self._publisher = self._node.create_publisher(DiagnosticArray, TOPIC, 10)
 
     def show(self, report: WindowReport) -> None:
-        """Publish a status for each target of a window."""
-        message = self._array()
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        message.status = [
-            self._status(
-                level=getattr(self._status, status.level),
-                name=f"msgflow: {status.target}",
-                message=status.message,
-                hardware_id=socket.gethostname(),
-                values=[self._pair(key=key, value=value) for key, value in status.values.items()],
+        """Publish a status for each target that a window was judged by."""
+        by_target: dict[str, list[dict[str, Any]]] = {}
+        for row in report.judged:
+            by_target.setdefault(row["target"], []).append(row)
+        array = self._array()
+        array.header.stamp = self._node.get_clock().now().to_msg()
+        array.status = []
+        for target, rows in by_target.items():
+            level, message, values = _status(rows, report.lag_s)
+            array.status.append(
+                self._status(
+                    level=getattr(self._status, level),
+                    name=f"msgflow: {target}",
+                    message=message,
+                    hardware_id=socket.gethostname(),
+                    values=[self._pair(key=key, value=value) for key, value in values.items()],
+                )
             )
-            for status in statuses(report)
-        ]
-        self._publisher.publish(message)
+        self._publisher.publish(array)
 
     def close(self) -> None:
         """End the node, when the last message has arrived."""

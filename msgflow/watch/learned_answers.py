@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgflow.files.yaml_file import quoted
 from msgflow.links.links_file import LinksFile, read_links
@@ -30,26 +30,6 @@ GROUP BY ALL
 """
 
 
-@dataclass(frozen=True, order=True)
-class _Pair:
-    """A topic that a node hears, and one that it publishes."""
-
-    node: str
-    pid: int
-    host: str
-    heard: str
-    published: str
-
-    @property
-    def entry(self) -> str:
-        """The line that declares it in a file of links."""
-        return (
-            f"  - {{kind: direct, node: {quoted(self.node)}, process: {self.pid},"
-            f" host: {quoted(self.host)}, inputs: [{quoted(self.heard)}],"
-            f" outputs: [{quoted(self.published)}]}}"
-        )
-
-
 class LearnedAnswers:
     """Which topics nodes of rclpy answer, by the windows so far.
 
@@ -59,13 +39,12 @@ class LearnedAnswers:
     """
 
     def __init__(self) -> None:
-        self._scores: Counter[_Pair] = Counter()
+        # By node, pid, host, a topic that the node hears, and one that it publishes.
+        self._scores: Counter[tuple[Any, ...]] = Counter()
 
     def doubted(self, con: duckdb.DuckDBPyConnection) -> str | None:
         """Learn from a window; return a file of links: what it doubts and earlier ones showed."""
-        verdicts = {
-            _Pair(*names): is_answer for *names, is_answer in con.execute(_PAIRS).fetchall()
-        }
+        verdicts = {tuple(pair): verdict for *pair, verdict in con.execute(_PAIRS).fetchall()}
         doubted = sorted(
             pair for pair, is_answer in verdicts.items() if not is_answer and self._scores[pair] > 0
         )
@@ -73,7 +52,14 @@ class LearnedAnswers:
             self._scores[pair] += 1 if is_answer else -1
         if not doubted:
             return None
-        return "\n".join(["links:", *(pair.entry for pair in doubted), ""])
+        return "\n".join(["links:", *(_entry(*pair) for pair in doubted), ""])
+
+
+def _entry(node: str, pid: int, host: str, heard: str, published: str) -> str:
+    return (
+        f"  - {{kind: direct, node: {quoted(node)}, process: {pid}, host: {quoted(host)},"
+        f" inputs: [{quoted(heard)}], outputs: [{quoted(published)}]}}"
+    )
 
 
 def with_learned(links: LinksFile | None, learned: str) -> LinksFile:

@@ -9,12 +9,15 @@ import pytest
 
 from msgflow.errors import RecordingError
 from msgflow.record import recording
-from msgflow.record.lttng import providers
+from msgflow.record.lttng import ros_processes
 from msgflow.record.session import Channel
 
 # A name as prctl takes it: controls, and a byte that is not UTF-8.
 LISTED = rb"""#!/bin/sh
-printf '<command><pids><pid><id>7</id><name>a\033\377b</name></pid></pids></command>'
+printf '<command><pids><pid><id>7</id><name>a\033\377b</name>'
+printf '<events><event><name>ros2:rcl_init</name></event></events></pid>'
+printf '<pid><id>8</id><name>c</name><events><event><name>other:x</name></event></events></pid>'
+printf '</pids></command>'
 """
 
 
@@ -23,8 +26,7 @@ def test_any_name_can_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     program.write_bytes(LISTED)
     program.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
-    (found,) = providers()
-    assert (found.pid, found.program) == (7, "a\ufffd\ufffdb")
+    assert ros_processes() == [("a\ufffd\ufffdb", 7)]
 
 
 @pytest.mark.thorough
@@ -34,7 +36,7 @@ def test_what_cannot_be_read_is_a_note(tmp_path: Path, monkeypatch: pytest.Monke
     def fail(*_: object) -> NoReturn:
         raise RecordingError("cannot read what lttng list says: x", "lttng list")
 
-    monkeypatch.setattr(recording, "providers", fail)
+    monkeypatch.setattr(recording, "ros_processes", fail)
     monkeypatch.setattr(recording, "losses", fail)
     notes: list[str] = []
     done = recording.record(
