@@ -29,6 +29,7 @@ from msgflow.fleet.ingest import Options, fleet_ingest
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import database_path, part_of, part_path
 from msgflow.fleet.pack import pack
+from msgflow.fleet.recording import State
 from msgflow.fleet.task import PASSING, Outcome, Task, needs, without_secrets
 from msgflow.fleet.workers import OneProcess
 from msgflow.sql.failure import out_of_memory
@@ -256,18 +257,16 @@ def test_a_process_that_dies_is_said(
 def test_a_source_that_changes_while_it_is_read(
     task: Task, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from msgflow.fleet import recording
-
     source = tmp_path / "r0"
     shutil.copytree(task.source, source)
-    look = recording.look_at
+    look = child_process.look_at
 
-    def then_it_grows(url: str) -> recording.State:
+    def then_it_grows(url: str) -> State:
         state = look(url)
         (source / "more").write_text("more")
         return state
 
-    monkeypatch.setattr(recording, "look_at", then_it_grows)
+    monkeypatch.setattr(child_process, "look_at", then_it_grows)
     (tmp_path / "scratch").mkdir()
     changed = child_process.do(
         Task(**{**asdict(task), "source": str(source)}), tmp_path / "scratch"
