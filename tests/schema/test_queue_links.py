@@ -91,6 +91,7 @@ def test_a_publication_too_many_answers_none(rules: duckdb.DuckDBPyConnection) -
     """It shows that a message before it was published for twice, or not at all."""
     assert links(rules, [10, 20, 60], [15, 25, 35, 65]) == [(1, 1, 2), (2, 2, 2), (4, 3, 1)]
     assert links(rules, [10, 20], [5, 15, 25]) == [(2, 1, 1), (3, 2, 1)]
+    assert links(rules, [10, 11], [5, 15, 25]) == [(2, 1, 1), (3, 2, 1)]
 
 
 def test_a_depth_that_what_came_out_contradicts(rules: duckdb.DuckDBPyConnection) -> None:
@@ -104,8 +105,14 @@ def test_a_depth_that_what_came_out_contradicts(rules: duckdb.DuckDBPyConnection
 
 
 def test_what_may_be_missing_makes_the_count_doubtful(rules: duckdb.DuckDBPyConnection) -> None:
-    rules.execute("INSERT INTO store.thread_break (thread_id, resumed_event_id) VALUES (2, 30)")
+    """From the first gap on, of the thread that publishes or that gets the messages."""
+    breaks = "INSERT INTO store.thread_break (thread_id, resumed_event_id) VALUES"
+    rules.execute(f"{breaks} (2, 30), (2, 99), (3, 1)")
     assert links(rules, [10, 20], [15, 35]) == [(1, 1, 1), (2, 2, 2)]
+    rules.execute(f"{breaks} (1, 14)")
+    assert links(rules, [10, 20], [15, 35]) == [(1, 1, 2), (2, 2, 2)]
+    rules.execute("DELETE FROM store.thread_break")
+    assert links(rules, [10], [15]) == [(1, 1, 1)]
     rules.execute("UPDATE store.subscription SET created_ns = NULL")
     assert links(rules, [10], [15]) == [(1, 1, 2)]
 
@@ -119,3 +126,21 @@ def test_every_output_answers_every_message(rules: duckdb.DuckDBPyConnection) ->
         " VALUES (1, 1, 30, NULL), (2, 2, 31, NULL), (3, 1, 32, 1), (4, 1, 40, NULL)"
     )
     assert rules.execute(LINKS).fetchall() == [(1, 1, 1), (2, 1, 1), (4, 2, 1)]
+
+
+def test_each_input_of_an_annotation_has_a_count_of_its_own(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """The last message of the first one comes too late for the second publication."""
+    rules.execute("""
+    INSERT INTO store.annotation (annotation_id) VALUES (1), (2);
+    INSERT INTO store.annotation_input VALUES (1, 2), (2, 3), (2, 1);
+    INSERT INTO store.subscription VALUES (2, 0), (3, NULL);
+    INSERT INTO run (subscription_id, callback_instance_id, start_event_id)
+    VALUES (1, 11, 10), (2, 21, 11), (3, 31, 12), (2, 22, 20), (3, 32, 22), (1, 12, 30);
+    INSERT INTO annotated (annotation_id, publication_id, publisher_id, start_event_id)
+    VALUES (1, 1, 1, 15), (2, 2, 2, 16), (1, 3, 1, 25), (2, 4, 2, 26);
+    """)
+    assert rules.execute(LINKS).fetchall() == [
+        (1, 11, 2), (1, 21, 1), (2, 11, 2), (2, 31, 2), (3, 22, 1), (4, 32, 2)
+    ]  # fmt: skip

@@ -65,7 +65,7 @@ answer AS (
     QUALIFY row_number() OVER (
         PARTITION BY annotation_id, input_id, publisher_id, number - surplus_count
         ORDER BY start_event_id
-    ) = 1 AND number > surplus_count
+    ) = 1
 ),
 -- What a full queue lost moves all later answers on: not further than to where each of them still
 -- has a message.
