@@ -40,5 +40,5 @@ def test_of_a_launch_test(msgflow_recorded):
     if shutil.which("launch_test") is None:
         pytest.skip("no launch_test: source /opt/ros/…/setup.sh")
     with msgflow_recorded() as database:
-        subprocess.run(["launch_test", HERE / "drive_launch_test.py"], check=True)
+        subprocess.run(["launch_test", HERE / "launch_drive.py"], check=True)
     require_quick(database)

@@ -254,6 +254,19 @@ def test_a_pipe_is_refused(tmp_path: Path, name: str) -> None:
             pass
 
 
+def test_a_bag_reads_no_file_outside_of_its_folder(tmp_path: Path) -> None:
+    """Whatever its metadata say of where its messages lie."""
+    bag = write_bag(tmp_path / "bag", [(1, "/plain", SECOND)])
+    (inside,) = bag.glob("*.db3")
+    outside = inside.rename(tmp_path / inside.name)
+    metadata = bag / "metadata.yaml"
+    text = metadata.read_text()
+    for path in (str(outside), f"../{outside.name}"):
+        metadata.write_text(text.replace(outside.name, path))
+        with pytest.raises(TraceError, match="cannot read as a bag"), read_bag(bag):
+            pass
+
+
 def test_a_file_that_unpacks_to_much_more_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

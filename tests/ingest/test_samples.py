@@ -217,6 +217,8 @@ HOSTILE = [
     "\t 1 py:::: (/tmp/perf-1.map)\n",
     "\t 1 new\nline 1/1 [000] 1.000000000: 7 cpu-clock: \n (/lib/x)\n",
     "\t" * 5_000 + "\n",
+    "\t 1 py::half\udcc3;\u2028\u202e</script>\x1b]0;title\x07:/tmp/r.py (/tmp/perf-1.map)\n",
+    "\t 1 " + "x" * 1_000_000 + " (/lib/x)\n",
 ]
 
 
@@ -228,6 +230,14 @@ def test_names_of_an_attacker_do_no_harm(session: Path, text: str, new_database:
     parts = [f"{line}{STACK}{other}" for line, other in zip(itertools.cycle(HOSTILE), others)]
     (session / TEXT).write_bytes("".join([head, *parts]).encode(errors="surrogateescape"))
     assert inside(ingest([session], new_database), new_database) == (count, count)
+    with open_db(new_database) as opened:
+        opened.export_folded(session / "folded")
+        opened.report(session / "report.html")
+    # No control of a name but the ends of lines, and no end of a script that a name wrote.
+    assert set((session / "folded").read_bytes()).isdisjoint({*range(10), *range(11, 32), 127})
+    page = (session / "report.html").read_text()
+    assert "<script>alert(1)" not in page
+    assert "</script>\x1b" not in page
 
 
 def test_a_deep_stack_is_cut(tmp_path: Path) -> None:

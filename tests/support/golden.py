@@ -20,7 +20,7 @@
                              `pytest --update-golden` write it, and read what it wrote
 
 A query is run as `Database.query` runs it; what the program asks for itself (internal.<name>) of
-run 1, likewise over tables of scratch; a page query (view.<name>) of run 1, with times from 0
+run 1, likewise over tables of scratch, sorted where it has no order; a page query (view.<name>) of run 1, with times from 0
 and a window of 4000 ns where the parameters say nothing else; a view (its full name, such as
 `main.node`) or a finding (`finding.NAME`) is read whole, a table macro called with its arguments,
 all sorted by all columns. An empty field is NULL, "" is an empty text. Lines that begin with # are
@@ -481,7 +481,9 @@ def _internal_rows(
     connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
 ) -> pa.Table:
     _make_scratch(connection, case)
-    return internal_sql().run(connection, name, _FRAME | given).to_arrow_table()
+    rows = internal_sql().run(connection, name, _FRAME | given)
+    is_ordered = re.search("^ORDER BY", internal_sql().text(name), re.MULTILINE)
+    return (rows if is_ordered else rows.order("ALL")).to_arrow_table()
 
 
 def _create(connection: duckdb.DuckDBPyConnection, what: str, text: str) -> None:

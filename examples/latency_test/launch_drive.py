@@ -1,4 +1,4 @@
-"""A launch test of the robot: `launch_test drive_launch_test.py`. It ends after 20 images."""
+"""A launch test of the robot: `launch_test launch_drive.py`. It ends after 20 images."""
 
 import unittest
 from pathlib import Path
