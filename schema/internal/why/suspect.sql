@@ -52,7 +52,7 @@ callback AS MATERIALIZED (
         p.path, p.p95_ns, p.path_ns, p.has_kernel,
         -- A callback may take up to most of its period, or 20 ms: a controller of 50 Hz notices.
         least(20_000_000, 0.8 * m.period_ns) AS limit_ns,
-        m.run_ns > 3 * m.usual_ns AND NOT p.has_kernel AS is_unusual
+        m.computed_ns > 3 * m.usual_ns AND NOT p.has_kernel AS is_unusual
     FROM why_callback AS m
     JOIN place AS p ON m.node = p.node AND m.label = p.what
     WHERE p.part IN ('callback', 'service')
