@@ -51,7 +51,7 @@ callback AS MATERIALIZED (
         p.path, p.p95_ns, p.path_ns, p.has_kernel,
         -- A callback may take up to most of its period, or 20 ms: a controller of 50 Hz notices.
         least(20_000_000, 0.8 * m.period_ns) AS limit_ns,
-        m.run_ns > 3 * m.usual_ns AND NOT p.has_kernel AS is_unusual
+        m.computed_ns > 3 * m.usual_ns AND NOT p.has_kernel AS is_unusual
     FROM why_callback AS m
     JOIN place AS p ON m.node = p.node AND m.label = p.what
     WHERE p.part IN ('callback', 'service')
@@ -84,14 +84,19 @@ holding AS (
         i.callback_id, quantile_disc(i.end_ns - i.start_ns, 0.5) AS usual_ns,
         quantile_disc(i.end_ns - i.start_ns, 0.95) AS run_ns,
         arg_max(w.service_name, w.call_ns) AS service_name,
-        arg_max(coalesce(w.server, 'a server that is not recorded'), w.call_ns) AS server,
+        arg_max(w.server, w.call_ns) AS server,
         sum(w.call_ns) > 0.5 * sum(i.end_ns - i.start_ns) AS is_calling
     FROM main.callback_instance AS i
     LEFT JOIN (
         SELECT
-            callback_instance_id, returned_ns - sent_ns AS call_ns, service_name, server
+            callback_instance_id, sum(returned_ns - sent_ns) AS call_ns,
+            arg_max(service_name, returned_ns - sent_ns) AS service_name,
+            arg_max(
+                coalesce(server, 'a server that is not recorded'), returned_ns - sent_ns
+            ) AS server
         FROM main.waited_call
         WHERE list_contains($runs, run_id)
+        GROUP BY callback_instance_id
     ) AS w
         ON i.callback_instance_id = w.callback_instance_id
     WHERE i.callback_id IN (SELECT callback_id FROM other)
@@ -292,7 +297,7 @@ UNION ALL
 SELECT
     'service', coalesce(server, 'a server that is not recorded'), service_name, path,
     call_ns + queued_ns,
-    call_ns >= limit_ns AND call_ns >= 0.1 * path_ns,
+    call_ns + queued_ns >= limit_ns AND call_ns + queued_ns >= 0.1 * path_ns,
     printf(
         'its service %s keeps a callback of %s waiting for %s of %s', service_name, node,
         main.duration_text(call_ns), main.duration_text(path_ns)
