@@ -138,7 +138,7 @@ def analysis(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> 
     """A database for one system after the other."""
     bench = Analysis(empty_database, tmp_path_factory.mktemp("analysis"))
     yield bench
-    bench.close()
+    bench.discard()
 
 
 @pytest.fixture(scope="session")

@@ -8,10 +8,11 @@ from pathlib import Path
 import duckdb
 import golden
 import pytest
-from golden import fill, fill_case
+from golden import derived_for, fill, insert_case
+from simple_plans import plan_simply
 
 from msgflow.db import objects
-from msgflow.db.derivation import derive, derive_findings
+from msgflow.db.derivation import derive, derive_findings, derive_table, learn_topics
 from msgflow.db.finding import (
     Finding,
     broken_rules,
@@ -47,7 +48,9 @@ SOUND: Tables = {
 def database(empty_database: Path, tmp_path: Path) -> duckdb.DuckDBPyConnection:
     path = tmp_path / "case.duckdb"
     shutil.copyfile(empty_database, path)
-    return duckdb.connect(str(path))
+    connection = duckdb.connect(str(path))
+    plan_simply(connection)
+    return connection
 
 
 def find(connection: duckdb.DuckDBPyConnection, run_id: int = 1) -> list[Finding]:
@@ -126,8 +129,11 @@ def test_without_the_rows_that_when_names_nothing_is_found(
     assert paths
     for path in paths:
         database.begin()
-        if fill_case(database, path).derives:
-            derive(database, 1)
+        case = insert_case(database, path)
+        if case.derives:
+            learn_topics(database, 1)
+        for table in derived_for(header.name, case):
+            derive_table(database, table, 1)
         rows = f"SELECT count(*) FROM ({statement([header])}) WHERE run_id = $run_id"
         assert database.execute(rows, {"run_id": 1}).fetchall() > [(0,)]
         for name, condition in header.sources:

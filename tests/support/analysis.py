@@ -96,8 +96,13 @@ class Analysis:
         return [value for (value,) in self.rows(sql)]
 
     def close(self) -> None:
+        """Close the database, with all that an ingest makes of the events."""
         self._provide(_everything())
         self._keep()
+        self.discard()
+
+    def discard(self) -> None:
+        """Close the database, which nobody reads any more."""
         self._connection.close()
 
     def _provide(self, needed: frozenset[str], found: frozenset[str] = frozenset()) -> None:

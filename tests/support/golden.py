@@ -268,18 +268,11 @@ class Bench:
 
     def _derive(self, name: str, case: Case) -> None:
         """Derive those tables that what is asked for reads, and that are not there yet."""
-        needed = needed_by(name)
-        finds = case.derives and "store.finding" in needed
-        tables = derived_tables() if case.derives else FLOW
-        missing = [
-            table
-            for table in tables
-            if table not in self._derived and (finds or f"store.{table}" in needed)
-        ]
+        missing = [table for table in derived_for(name, case) if table not in self._derived]
         for run_id in runs_of(self._connection):
             for table in missing:
                 derive_table(self._connection, table, run_id)
-            if finds:
+            if finds(name, case):
                 derive_findings(self._connection, run_id)
         self._derived.update(missing)
 
@@ -322,6 +315,18 @@ def needed_by(name: str) -> frozenset[str]:
     """Return all objects and tables that cases of a folder may read, directly or not."""
     words = (match.groups() for match in _NAME.finditer(_text_of(name)))
     return objects.sources_of(f"{schema or 'main'}.{word}" for schema, word in words)
+
+
+def derived_for(name: str, case: Case) -> list[str]:
+    """Return the tables that are derived for what a folder asks of a case, in their order."""
+    needed = needed_by(name)
+    tables = derived_tables() if case.derives else FLOW
+    return [table for table in tables if finds(name, case) or f"store.{table}" in needed]
+
+
+def finds(name: str, case: Case) -> bool:
+    """Tell whether what a folder asks of a case reads the findings of the recording."""
+    return case.derives and "store.finding" in needed_by(name)
 
 
 def _text_of(name: str) -> str:

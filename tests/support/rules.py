@@ -7,7 +7,6 @@ from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 
 import duckdb
-from simple_plans import plan_simply
 
 from msgflow.db import objects
 
@@ -57,8 +56,8 @@ def _as_made(*statements: str) -> Iterator[duckdb.DuckDBPyConnection]:
 
 @cache
 def _made(statements: tuple[str, ...]) -> duckdb.DuckDBPyConnection:
-    con = duckdb.connect()
-    plan_simply(con)
+    # Of a few rows, there is nothing to share out.
+    con = duckdb.connect(config={"threads": 1})
     for statement in statements:
         con.execute(statement)
     return con
