@@ -21,7 +21,7 @@ _TRACED = """
 SELECT
     list(path) AS paths, sum(event_count)::BIGINT AS events, max(end_ns) - min(start_ns) AS took_ns
 FROM main.trace
-WHERE run_id = $run_id AND domain = 'ust'
+WHERE run_id = {run} AND domain = 'ust'
 """
 
 
@@ -63,5 +63,5 @@ def part_of_latencies(database: Database, latencies: QueryResult) -> Iterator[st
 def _traced(database: Database, run: int) -> tuple[int | None, int | None, float | None]:
     from msgflow.record.event_cost import event_cost_ns
 
-    ((paths, events, took_ns),) = database.connection.execute(_TRACED, {"run_id": run}).fetchall()
-    return events, took_ns, event_cost_ns(paths or [])
+    (row,) = database.sql(_TRACED.format(run=run)).table.to_pylist()
+    return row["events"], row["took_ns"], event_cost_ns(row["paths"] or [])

@@ -1,6 +1,6 @@
 -- description: Names of slices. A slice refers to its name by code and id; id 0 is what is not
---     known. Calls that a callback waited for have the name of their service; where the trace has no
---     such service, each client has its own.
+--     known. Calls that a callback waited for have the name of their service; where the trace has
+--     no such service, each client has its own.
 -- grain: one row per name
 SELECT 0 AS code, callback_id AS id, node || ' ' || label AS name
 FROM main.callback_label
