@@ -19,9 +19,11 @@ _EVENTS_OF_HOP = 12
 _MOST_PATHS = 3
 _TRACED = """
 SELECT
-    list(path) AS paths, sum(event_count)::BIGINT AS events, max(end_ns) - min(start_ns) AS took_ns
+    run_id, list(path) AS paths, sum(event_count)::BIGINT AS events,
+    max(end_ns) - min(start_ns) AS took_ns
 FROM main.trace
-WHERE run_id = $run_id AND domain = 'ust'
+WHERE domain = 'ust'
+GROUP BY run_id
 """
 
 
@@ -63,5 +65,6 @@ def part_of_latencies(database: Database, latencies: QueryResult) -> Iterator[st
 def _traced(database: Database, run: int) -> tuple[int | None, int | None, float | None]:
     from msgflow.record import event_cost_ns
 
-    ((paths, events, took_ns),) = database.connection.execute(_TRACED, {"run_id": run}).fetchall()
-    return events, took_ns, event_cost_ns(paths or [])
+    rows = database.sql(_TRACED, limit=None).table.to_pylist()
+    row = next((row for row in rows if row["run_id"] == run), {"events": None, "took_ns": None})
+    return row["events"], row["took_ns"], event_cost_ns(row.get("paths") or [])
