@@ -19,9 +19,11 @@ _EVENTS_OF_HOP = 12
 _MOST_PATHS = 3
 _TRACED = """
 SELECT
-    list(path) AS paths, sum(event_count)::BIGINT AS events, max(end_ns) - min(start_ns) AS took_ns
+    run_id, list(path) AS paths, sum(event_count)::BIGINT AS events,
+    max(end_ns) - min(start_ns) AS took_ns
 FROM main.trace
-WHERE run_id = {run} AND domain = 'ust'
+WHERE domain = 'ust'
+GROUP BY run_id
 """
 
 
@@ -63,5 +65,6 @@ def part_of_latencies(database: Database, latencies: QueryResult) -> Iterator[st
 def _traced(database: Database, run: int) -> tuple[int | None, int | None, float | None]:
     from msgflow.record.event_cost import event_cost_ns
 
-    (row,) = database.sql(_TRACED.format(run=run)).table.to_pylist()
-    return row["events"], row["took_ns"], event_cost_ns(row["paths"] or [])
+    rows = database.sql(_TRACED, limit=None).table.to_pylist()
+    row = next((row for row in rows if row["run_id"] == run), {"events": None, "took_ns": None})
+    return row["events"], row["took_ns"], event_cost_ns(row.get("paths") or [])

@@ -204,7 +204,7 @@ def test_nodes(way: str, demo: Path, serve: Serve, report: Report, page: Page) -
         longest = opened.query("callbacks-each", slowest=1).to_arrow().to_pylist()
     page.open(serve(demo).address if way == "served" else report(demo))
     page.go("#/nodes")
-    page.page.get_by_text("query waits").wait_for()
+    page.page.get_by_text("query waits").first.wait_for()
     callbacks.sort(key=lambda row: -(row["max_ns"] or 0))
     found = cells(page, "callbacks")
     assert len(found) == len(callbacks)
