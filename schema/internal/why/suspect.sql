@@ -184,7 +184,9 @@ kept AS (
 sampled AS (
     SELECT
         p.node, p.what, p.path, p.path_ns, p.p95_ns AS cost_ns, NULL AS inputs,
-        c.period_ns >= 2 * p.period_ns AND p.p95_ns >= 20_000_000 AS matters
+        -- A callback of a message has to wait for the other inputs that it uses together.
+        starts_with(p.what, 'Timer(') AND c.period_ns >= 2 * p.period_ns
+        AND p.p95_ns >= 20_000_000 AS matters
     FROM place AS p
     JOIN callback AS c ON p.node = c.node AND p.what = c.label AND p.path = c.path
     WHERE p.part = 'cache'
