@@ -258,7 +258,7 @@ def _named(sql: str) -> frozenset[str]:
         return frozenset()
     every = _of("input") | _of("recording")
     texts = [text.replace("%", "*") for text in _TEXT.findall(sql)]
-    found = {name for text in texts for name in fnmatch.filter(every, text)}
+    found = frozenset(name for text in texts for name in fnmatch.filter(every, text))
     return found | every.intersection(_TEXT.findall(statement(_headers(found))))
 
 
