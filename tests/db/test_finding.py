@@ -9,7 +9,6 @@ import duckdb
 import golden
 import pytest
 from golden import derived_for, fill, insert_case
-from simple_plans import plan_simply
 
 from msgflow.db import objects
 from msgflow.db.derivation import derive, derive_findings, derive_table, learn_topics
@@ -48,9 +47,7 @@ SOUND: Tables = {
 def database(empty_database: Path, tmp_path: Path) -> duckdb.DuckDBPyConnection:
     path = tmp_path / "case.duckdb"
     shutil.copyfile(empty_database, path)
-    connection = duckdb.connect(str(path))
-    plan_simply(connection)
-    return connection
+    return duckdb.connect(str(path))
 
 
 def find(connection: duckdb.DuckDBPyConnection, run_id: int = 1) -> list[Finding]:
