@@ -16,7 +16,7 @@
 WITH span AS (
     SELECT
         run_id, least(end_ns, $end_ns) - greatest(start_ns, $start_ns) AS length_ns,
-        run_id IN (SELECT run_id FROM main.thread_state) AS has_kernel
+        run_id IN (SELECT run_id FROM main.thread_state WHERE $has_kernel) AS has_kernel
     FROM main.run
     WHERE list_contains($runs, run_id)
 ),
@@ -93,6 +93,7 @@ calling AS (
     JOIN main.service AS v ON c.service_id = v.service_id
     JOIN main.process AS r ON v.process_id = r.process_id
     LEFT JOIN main.node AS n ON v.node_id = n.node_id
+    WHERE $has_calls
 ),
 -- Subscriptions with messages that failed, from the first that they took on.
 failing AS (
@@ -177,7 +178,7 @@ sampled AS (
 -- Executors of several threads that look for work again and again.
 awake AS (
     SELECT n.full_name AS node, min(f.detail) AS detail
-    FROM main.finding AS f
+    FROM store.finding AS f
     JOIN main.process AS p
         ON f.run_id = p.run_id
         AND starts_with(f.subject, printf('%s %d on ', coalesce(p.name, '?'), p.pid))
