@@ -334,7 +334,7 @@ def test_clocks_that_differ_are_named(
     connection.execute("ALTER TABLE clock ADD COLUMN uncertainty_ns BIGINT")
     connection.execute("CREATE TABLE host (host_id BIGINT, clock_id BIGINT, hostname VARCHAR)")
     connection.execute("CREATE TABLE clock_uncertainty (clock_id BIGINT, uncertainty_ns BIGINT)")
-    connection.execute("CREATE SCHEMA store")
+    connection.execute("CREATE SCHEMA IF NOT EXISTS store")
     connection.execute("CREATE TABLE store.run (run_id BIGINT, clock_sync VARCHAR)")
     if in_vain:
         connection.execute("INSERT INTO store.run VALUES (1, 'messages')")
@@ -448,7 +448,7 @@ def test_how_far_corrected_clocks_can_be_wrong_is_said(
         "uncertainty_ns BIGINT)",
         "CREATE TABLE host (host_id BIGINT, clock_id BIGINT, hostname VARCHAR)",
         "CREATE TABLE clock_uncertainty (clock_id BIGINT, uncertainty_ns BIGINT)",
-        "CREATE SCHEMA store",
+        "CREATE SCHEMA IF NOT EXISTS store",
         "CREATE TABLE store.run (run_id BIGINT, clock_sync VARCHAR)",
         "INSERT INTO host VALUES (1, 1, 'alpha'), (2, 2, 'beta'), (3, 1, 'inside')",
         "INSERT INTO clock VALUES (1, 1, 1, 0)",
