@@ -71,7 +71,8 @@ SELECT
     run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
     reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain'
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain',
+    has_calls := $has_calls, has_gaps := $has_gaps, has_states := $has_states
 );
 
 CREATE OR REPLACE TEMP TABLE named_path AS
@@ -106,7 +107,11 @@ SELECT
 FROM main.end_to_end_piece('critical_flow', 'critical_trail', $runs);
 
 CREATE OR REPLACE TEMP TABLE critical_piece AS
-SELECT * FROM main.critical_piece('critical_part', $runs);
+SELECT *
+FROM main.critical_piece(
+    'critical_part', $runs, has_kernel := $has_kernel, has_calls := $has_calls,
+    has_teams := $has_teams
+);
 
 WITH untraced AS (
     -- What a thread did without a traced callback led to the message that comes next, unless it
@@ -176,22 +181,26 @@ piece AS (
         $detail = 'short' AND c.activity IN ('intra', 'rclcpp', 'rcl', 'rmw', 'dds')
             AND c.part = c.activity AS is_layer
     FROM untraced AS c
-    LEFT JOIN main.thread AS t ON c.state_thread_id = t.thread_id
+    LEFT JOIN (FROM main.thread WHERE $has_kernel) AS t ON c.state_thread_id = t.thread_id
     -- Where no callback is traced, the only node of the process that did it.
     LEFT JOIN (
         SELECT process_id, any_value(full_name) AS node
         FROM main.node
+        WHERE $has_kernel
         GROUP BY process_id
         HAVING count(*) = 1
     ) AS o
         ON t.process_id = o.process_id AND c.wakers = 0
-    LEFT JOIN main.thread AS bt ON c.by_thread_id = bt.thread_id
-    LEFT JOIN main.thread_label AS tl ON c.state_thread_id = tl.thread_id
-    LEFT JOIN main.thread_label AS bl ON c.by_thread_id = bl.thread_id
-    LEFT JOIN main.other_thread AS bo ON c.by_other_thread_id = bo.other_thread_id
+    LEFT JOIN (FROM main.thread WHERE $has_kernel) AS bt ON c.by_thread_id = bt.thread_id
+    LEFT JOIN (FROM main.thread_label WHERE $has_kernel) AS tl
+        ON c.state_thread_id = tl.thread_id
+    LEFT JOIN (FROM main.thread_label WHERE $has_kernel) AS bl
+        ON c.by_thread_id = bl.thread_id
+    LEFT JOIN (FROM main.other_thread WHERE $has_kernel) AS bo
+        ON c.by_other_thread_id = bo.other_thread_id
     LEFT JOIN main.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
     LEFT JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-    LEFT JOIN main.waited_call AS v
+    LEFT JOIN (FROM main.waited_call WHERE $has_calls) AS v
         ON c.request_id = v.request_id AND list_contains($runs, v.run_id)
     LEFT JOIN main.publication AS b ON c.message_id = b.publication_id
     LEFT JOIN main.publisher AS p ON b.publisher_id = p.publisher_id

@@ -65,7 +65,8 @@ SELECT
     run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
     reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain'
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain',
+    has_calls := $has_calls, has_gaps := $has_gaps, has_states := $has_states
 );
 
 CREATE OR REPLACE TEMP TABLE named_path AS
@@ -74,6 +75,7 @@ FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
 
 -- Only where the end of a path goes on can anything come back to it.
 -- when: named_path WHERE subscription_id IN (FROM main.continued_subscription($runs))
+-- columns: path_id BIGINT, number BIGINT
 CREATE OR REPLACE TEMP TABLE looped_path AS
 SELECT path_id, count(*) AS number
 FROM main.looped_arrival(

@@ -32,7 +32,8 @@ SELECT
     run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
     reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain'
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain',
+    has_calls := $has_calls, has_gaps := $has_gaps, has_states := $has_states
 );
 
 CREATE OR REPLACE TEMP TABLE named_path AS

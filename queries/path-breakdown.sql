@@ -47,7 +47,8 @@ SELECT
     run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
     reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain'
+    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain',
+    has_calls := $has_calls, has_gaps := $has_gaps, has_states := $has_states
 );
 
 CREATE OR REPLACE TEMP TABLE named_path AS
@@ -82,6 +83,7 @@ LEFT JOIN main.executor AS e ON w.executor_id = e.executor_id
 WHERE list_contains($runs, i.run_id);
 
 -- when: main.thread_state, main.data_arrival
+-- columns: take_id BIGINT, until_arrival_ns BIGINT, run_queue_ns BIGINT, executor_ns BIGINT
 CREATE OR REPLACE TEMP TABLE exact_arrival AS
 SELECT take_id, until_arrival_ns, run_queue_ns, executor_ns
 FROM main.arrival
@@ -111,7 +113,8 @@ WITH piece AS (
             END
         ) AS piece
     FROM main.end_to_end_piece_explained(
-        'breakdown_flow', 'breakdown_trail', 'breakdown_callback', $runs
+        'breakdown_flow', 'breakdown_trail', 'breakdown_callback', $runs,
+        has_turns := $has_turns
     ) AS p
     LEFT JOIN breakdown_arrival AS a
         ON p.flow_id = a.flow_id AND p.hop = a.hop AND p.part = 'publish_to_take'

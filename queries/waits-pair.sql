@@ -26,6 +26,7 @@
 --     waits, overlap_max_ns, overlap_min_ns, instances
 
 -- when: main.thread_state, main.data_arrival
+-- columns: take_id BIGINT, until_arrival_ns BIGINT, run_queue_ns BIGINT, executor_ns BIGINT
 CREATE OR REPLACE TEMP TABLE exact_arrival AS
 SELECT take_id, until_arrival_ns, run_queue_ns, executor_ns
 FROM main.arrival
@@ -36,7 +37,9 @@ SELECT
     run_id, callback_instance_id, executor_id, callback_id, start_ns, busy_min_ns, busy_max_ns,
     held_max_ns, run_queue_ns, preempted_ns, meanwhile_callback_ids, meanwhile_ns,
     meanwhile_certain_ns, meanwhile_thread_ns, meanwhile_instances, cpu_taken_by, cpu_taken_ns
-FROM main.executor_wait_explained($runs, arrivals := 'exact_arrival');
+FROM main.executor_wait_explained(
+    $runs, arrivals := 'exact_arrival', has_kernel := $has_kernel, has_teams := $has_teams
+);
 
 WITH pair AS (
     SELECT

@@ -118,13 +118,13 @@ def _shown(found: Explanation) -> dict[str, QueryResult]:
 
 
 def _in_words(rows: QueryResult) -> QueryResult:
-    import pyarrow as pa
+    from msgflow.trace.numpy_arrow import texts_to_arrow
 
     table = rows.table
     for place, name in enumerate(table.column_names):
         if name in ("part", "activity"):
             words = [_WORDS.get(word, word) for word in table[name].to_pylist()]
-            table = table.set_column(place, name, pa.array(words, pa.string()))
+            table = table.set_column(place, name, texts_to_arrow(words))
     return replace(rows, table=table)
 
 

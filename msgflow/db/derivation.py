@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from msgflow.db import objects
 from msgflow.db.finding import kinds_of, store_findings
 from msgflow.db.store_table import store_tables
+from msgflow.sql.statement import RECORDED, recorded
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     import duckdb
 
@@ -118,10 +119,11 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
     whole = _header(f"derive.{name}")
     for header in (whole, *map(_header, whole.also)):
         if _may_have_rows(con, header, run_id):
+            parts = [part for part in RECORDED if f"{part} := true" in header.body]
             con.execute(
                 f"INSERT INTO store.{name} ({columns}) {_united(con, header, run_id)}"
-                f"SELECT {columns} FROM {_of_run(header.name)}",
-                {"run_id": run_id},
+                f"SELECT {columns} FROM {_of_run(header.name, parts)}",
+                {"run_id": run_id, **recorded(con, parts)},
             )
 
 
@@ -148,11 +150,16 @@ def _united(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> str:
     return f"WITH united AS MATERIALIZED ({rows}) "
 
 
-def _of_run(name: str) -> str:
-    """Return what follows FROM for the rows of the run `$run_id`."""
+def _of_run(name: str, parts: Sequence[str] = ()) -> str:
+    """Return what follows FROM for the rows of the run `$run_id`.
+
+    `parts` are the parameters of a macro among RECORDED.
+    """
     if name.startswith("store.") or _header(name).kind == "view":
         return f"{name} WHERE run_id = $run_id"
-    return f"{name}('united', $run_id)" if _header(name).unites else f"{name}($run_id)"
+    words = ["'united'"] if _header(name).unites else []
+    words += ["$run_id", *(f"{part} := ${part}" for part in parts)]
+    return f"{name}({', '.join(words)})"
 
 
 @cache

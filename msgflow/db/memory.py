@@ -30,12 +30,13 @@ _LEAST_BESIDE = 1 << 28
 _EXAMPLE = "MSGFLOW_MEMORY_LIMIT=2GB"
 
 
-def default_limit() -> str:
+def default_limit(connection: duckdb.DuckDBPyConnection | None = None) -> str:
     """Return the memory limit of an ingest or a server without `--memory-limit`.
 
-    It is a quarter of the memory of the machine, at least 500 MB and at most 4 GB.
+    It is a quarter of the memory of the machine, at least 500 MB and at most 4 GB. A `connection`
+    that has DuckDB's own limit as yet spares the time to make one.
     """
-    with duckdb.connect() as con:
+    with contextlib.nullcontext(connection) if connection else duckdb.connect() as con:
         share = _SHARE_OF_OWN_LIMIT * _limit_bytes(con)
     return f"{min(max(share, _LEAST_DEFAULT_BYTES), _MOST_DEFAULT_BYTES) / 1e9:.1f}GB"
 
@@ -86,15 +87,18 @@ def bound(kind: int, most: int) -> None:
 
 
 @contextlib.contextmanager
-def ingest_memory_errors(limit: str) -> Iterator[None]:
-    """Turn an out-of-memory error of an ingest into one that says what to do."""
+def ingest_memory_errors(limit: str | None) -> Iterator[None]:
+    """Turn an out-of-memory error of an ingest into one that says what to do.
+
+    `limit` is that of the ingest, the default when None.
+    """
     try:
         yield
     except duckdb.OutOfMemoryException as error:
         if is_of_the_file(error):  # the disk is full
             raise
         raise DatabaseError(
-            f"the traces need more memory than {limit}",
+            f"the traces need more memory than {limit or default_limit()}",
             "give more with --memory-limit, or read a shorter part of the recording",
         ) from error
 

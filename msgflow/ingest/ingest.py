@@ -124,11 +124,10 @@ def ingest(
     clocks = read_clock_sync(clock_sync)
     if database.is_symlink():
         database = Path(os.path.realpath(database))
-    limit = memory_limit or default_limit()
     with (
         noted_interrupts() as interrupts,
         database_errors(database),
-        ingest_memory_errors(limit),
+        ingest_memory_errors(memory_limit),
     ):
         watch = _Watch(progress, interrupts)
         watch.enter("opening the traces")
@@ -144,7 +143,7 @@ def ingest(
                 _target(database, directory) as target,
                 contextlib.closing(open_memory()) as con,
             ):
-                set_memory_limit(con, limit)
+                set_memory_limit(con, memory_limit or default_limit(con))
                 limit_threads(con)
                 con.execute("SET temp_directory = ?", [str(directory)])
                 # A checkpoint would write many of the row groups that were just written again.

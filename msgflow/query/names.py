@@ -64,16 +64,24 @@ WHERE NOT EXISTS (
 
 
 def require_places(
-    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], bound: Mapping[str, Value]
+    connection: duckdb.DuckDBPyConnection,
+    runs: Sequence[Run],
+    bound: Mapping[str, Value],
+    *,
+    is_known: bool = False,
 ) -> dict[str, Value]:
-    """Return topics and nodes among the parameters of a query, which the runs must have."""
+    """Return topics and nodes among the parameters of a query, which the runs must have.
+
+    `is_known` says that they have them.
+    """
     places: dict[str, Value] = {}
     for key in PLACE_PARAMETERS:
         given = bound.get(key)
         if isinstance(given, str):
             given = [*names_in(connection, runs, "place", given)]
         if isinstance(given, list):
-            require_names(connection, runs, "place", [str(each) for each in given])
+            if not is_known:
+                require_names(connection, runs, "place", [str(each) for each in given])
             places[key] = given
     return places
 

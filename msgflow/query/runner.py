@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import shlex
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import duckdb
@@ -27,7 +28,7 @@ from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import LATEST, Slice
 from msgflow.run.window import format_epoch
 from msgflow.sql.failure import first_line, query_errors
-from msgflow.sql.statement import internal_sql, may_have_rows
+from msgflow.sql.statement import RECORDED, internal_sql, may_have_rows, recorded
 from msgflow.sql.value import described_type, parse_text
 from msgflow.text.name_suggestions import did_you_mean
 from msgflow.text.values import format_duration
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
     from msgflow.sql.header import Header, Param
     from msgflow.sql.value import Value
 
-RESERVED = ("runs", "start_ns", "end_ns")
+RESERVED = ("runs", "start_ns", "end_ns", *RECORDED)
 # By the note of a header: what has rows where that was recorded, and what to say where it was not.
 _LACKING = {
     "kernel": (
@@ -93,6 +94,11 @@ class Steps:
             with contextlib.suppress(duckdb.Error):
                 self._connection.execute(f"DROP TABLE IF EXISTS temp.{table}")
 
+    @cached_property
+    def recorded(self) -> Mapping[str, bool]:
+        """What the recordings of the database have, by the names in RECORDED."""
+        return recorded(self._connection)
+
     def make(self, header: Header, values: Mapping[str, Any]) -> None:
         """Make the tables of a query that are not there yet, for these values of its parameters."""
         for step in header.steps:
@@ -110,8 +116,14 @@ class Steps:
             elif may_have_rows(self._connection, step.sources, values):
                 self._connection.execute(*wanted)
             else:
-                self._execute(f"{step.sql.removesuffix(';')}\nLIMIT 0", values)
+                self._execute(f"CREATE OR REPLACE TEMP TABLE {step.table} ({step.columns})", {})
             self._made[step.table] = wanted
+
+    def answer(self, sql: str, values: Mapping[str, Any]) -> pa.Table:
+        """Return the rows of a query. DuckDB would look twice at the SQL of a relation."""
+        self._made["answer"] = "", {}
+        self._connection.execute(f"CREATE OR REPLACE TEMP TABLE answer AS {sql}", values)
+        return self._connection.sql("FROM temp.answer").to_arrow_table()
 
     def _execute(self, sql: str, values: Mapping[str, Any]) -> None:
         (statement,) = self._connection.extract_statements(sql)
@@ -129,11 +141,13 @@ def run_query(
     selection: Selection | None = None,
     steps: Steps | None = None,
     runs: tuple[Run, ...] | None = None,
+    is_known: bool = False,
 ) -> QueryResult:
     """Run the query of `header` with its own parameters; text is read as the declared type.
 
     `steps` are tables that it shares with other queries, which stay; `runs` are those of `part`,
-    where they are known. A UsageError is about what the user gave, a QueryError about the rest.
+    where they are known. `is_known` says that the places among the parameters are of these runs. A
+    UsageError is about what the user gave, a QueryError about the rest.
     """
     if part.has_window and not header.has_window:
         raise UsageError(
@@ -144,7 +158,7 @@ def run_query(
     window = part.window(runs)
     reserved: dict[str, Value] = {"runs": [run.run_id for run in runs], **window.bindings}
     own = bind(header, parameters)
-    own |= require_places(connection, runs, own)
+    own |= require_places(connection, runs, own, is_known=is_known)
     require_ids(connection, runs, own)
     selection = selection or Selection()
     sql, chosen = selected(header, selection, internal)
@@ -152,14 +166,16 @@ def run_query(
         require_names(connection, runs, kind, names)
     values = reserved | own
     used = connection.extract_statements(header.body)[0].named_parameters
-    bindings = {name: values[name] for name in used} | chosen
     with (
         query_errors(header.words, f"the query failed: {{}} — {header.words}"),
         contextlib.nullcontext(steps) if steps is not None else Steps(connection) as tables,
     ):
+        if any("$has_" in text for text in header.statements):
+            values |= tables.recorded
         tables.make(header, values)
+        bindings = {name: values[name] for name in used} | chosen
         try:
-            table = connection.sql(sql, params=bindings).to_arrow_table()
+            table = tables.answer(sql, bindings)
         except _OF_CONDITIONS as error:
             if selection.where is None:
                 raise

@@ -17,7 +17,7 @@ from msgflow.sql.statement import internal_sql, registered
 from msgflow.text.values import format_duration
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     import duckdb
     import pyarrow as pa
@@ -47,13 +47,14 @@ _BY_STATE = {"preempted": "preemption", "runnable": "wakeup"}
 _BY_TOPIC = dict.fromkeys(("network_or_idle", "undecided"), ("topics", "--measure", "latency"))
 _LINKS = ("suggest", "links")
 _DEAD_ENDS = (
-    "SELECT subject, detail FROM main.finding WHERE name = 'dead_end' AND list_contains(?, run_id)"
+    "SELECT subject, detail FROM store.finding WHERE name = 'dead_end' AND list_contains(?, run_id)"
 )
 # Steps whose rows an earlier query of the explanation has in its tables: it costs less to read them
 # there. The breakdown explains the waits of all flows, and one of these is the flow that is shown.
 _KNOWN = {
     "explained_wait": "FROM main.executor_wait_explained("
-    "$runs, arrivals := 'exact_arrival', waits := 'ready_wait')",
+    "$runs, arrivals := 'exact_arrival', waits := 'ready_wait',"
+    " has_kernel := $has_kernel, has_teams := $has_teams)",
     "breakdown_wait": "SELECT callback_instance_id, executor_id, busy_min_ns, busy_max_ns,"
     " held_max_ns FROM explained_wait",
     "critical_trail": "SELECT c.flow_id, t.hop, t.take_id, t.publication_id, t.previous_take_id,"
@@ -61,8 +62,9 @@ _KNOWN = {
     " AND c.root_kind = b.root_kind AND c.root_id = b.root_id AND c.take_id = b.take_id"
     " JOIN breakdown_trail AS t ON b.flow_id = t.flow_id",
     "critical_part": "FROM main.end_to_end_piece_explained("
-    "'critical_flow', 'critical_trail', 'breakdown_callback', $runs)",
-    "critical_piece": "FROM main.critical_piece('critical_part', $runs, waits := 'ready_wait')",
+    "'critical_flow', 'critical_trail', 'breakdown_callback', $runs, has_turns := $has_turns)",
+    "critical_piece": "FROM main.critical_piece('critical_part', $runs, waits := 'ready_wait',"
+    " has_kernel := $has_kernel, has_calls := $has_calls, has_teams := $has_teams)",
 }
 # How to know what a sentence says is not known.
 _UNKNOWN = {
@@ -125,14 +127,18 @@ def explain(
     with Steps(connection, _KNOWN) as steps:
 
         def ask(name: str, part: Slice, **given: Value) -> QueryResult:
-            result = run_query(connection, load_query(name), given, part, steps=steps, runs=(run,))
+            header, is_first = load_query(name), name == "e2e-latency"
+            # It has looked for the places that are asked for; others are of its paths.
+            result = run_query(
+                connection, header, given, part, steps=steps, runs=(run,), is_known=not is_first
+            )
             # Only its paths have to be told apart.
-            if name != "e2e-latency":
+            if not is_first:
                 return result
             return with_path_numbers(connection, result, *([] if given else ["named_path"]))
 
         try:
-            return _explained(connection, ask, run, times, place)
+            return _explained(connection, ask, run, times, place, steps.recorded)
         finally:
             for name in ("ready_wait", *_OF_VERDICT):
                 connection.execute(f"DROP TABLE IF EXISTS temp.{name}")
@@ -144,6 +150,7 @@ def _explained(
     run: Run,
     asked: Slice,
     place: str | None,
+    recorded: Mapping[str, bool],
 ) -> Explanation:
     ends = {} if place is None else {"to": place}
     paths = ask_of("e2e-latency", asked, **ends)
@@ -164,7 +171,7 @@ def _explained(
         # A recording may be shorter than the steps in which it is left out.
         times, paths, skipped = (later, warm, skipped) if _has_flows(warm) else (asked, paths, 0.0)
     ask = partial(ask_of, part=times)
-    values = {"runs": [run.run_id], **times.window([run]).bindings}
+    values = {"runs": [run.run_id], **times.window([run]).bindings, **recorded}
     values["asked_ns"] = asked.window([run]).start_ns
     internal_sql().keep(connection, "ready_wait", values)
     waits = ask("waits-pair")

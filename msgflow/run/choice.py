@@ -48,16 +48,19 @@ class Run:
 def read_runs(connection: duckdb.DuckDBPyConnection) -> tuple[Run, ...]:
     """Return all runs of the database, oldest first."""
     rows = connection.execute(
-        "SELECT run_id, name, start_ns, coalesce(labels, []), end_ns FROM main.run ORDER BY run_id"
+        "SELECT run_id, name, start_ns, coalesce(labels, []), end_ns, "
+        "EXISTS (FROM store.simulated_time) FROM main.run ORDER BY run_id"
     ).fetchall()
     simulated: dict[int, dict[int, int]] = defaultdict(dict)
-    for run_id, at_ns, simulated_ns in connection.execute(
-        "SELECT run_id, at_ns, simulated_ns FROM main.simulated_time ORDER BY run_id, at_ns"
-    ).fetchall():
-        simulated[run_id][at_ns] = simulated_ns
+    # Few databases have any.
+    if rows and rows[0][-1]:
+        for run_id, at_ns, simulated_ns in connection.execute(
+            "SELECT run_id, at_ns, simulated_ns FROM main.simulated_time ORDER BY run_id, at_ns"
+        ).fetchall():
+            simulated[run_id][at_ns] = simulated_ns
     return tuple(
         Run(run_id, name, start_ns, tuple(labels), end_ns, tuple(simulated[run_id].items()))
-        for run_id, name, start_ns, labels, end_ns in rows
+        for run_id, name, start_ns, labels, end_ns, _ in rows
     )
 
 

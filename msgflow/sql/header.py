@@ -66,7 +66,10 @@ The tables that a statement looks up stay in memory until it ends. A query may t
 steps: other statements stand before its own, each of the form
 `CREATE OR REPLACE TEMP TABLE name AS SELECT …;`. A line `-- when: main.a, main.b` above one names
 what it has its rows from, as in the header: where that has no row, the table is empty, and DuckDB
-does not plan the SQL.
+does not look at the SQL. The line below says which columns it has: `-- columns: a_id BIGINT`.
+
+What few recordings have may stand behind `WHERE $has_kernel`, or another name of RECORDED
+(`msgflow.sql.statement`). DuckDB plans nothing for it where no recording has any.
 """
 
 from __future__ import annotations
@@ -93,7 +96,7 @@ _DEFAULT = r"(?: += +(?P<default>'(?:[^']|'')*'|\[[^\]]*\]|[^'\s\[]\S*))?"
 _PARAM = re.compile(rf"{_NAME} +{_TYPE}{_CHOICES}{_DEFAULT}(?P<gap> +)(?P<description>\S.*)")
 _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<description>\S.*)")
 _STEP = re.compile(
-    r"(?:-- when: (?P<when>[^\n]*)\n|--[^\n]*\n)*"
+    r"(?:-- when: (?P<when>[^\n]*)\n-- columns: (?P<columns>[^\n]*)\n|--[^\n]*\n)*"
     r"CREATE OR REPLACE TEMP TABLE (?P<table>[a-z_]+) AS\n.*?;\n+",
     re.DOTALL,
 )
@@ -163,6 +166,7 @@ class Step:
     # Tables and views, each with a condition on its rows, or with an empty one: if none of them has
     # such a row, the table has none. Not known when empty.
     sources: tuple[tuple[str, str], ...] = ()
+    columns: str = ""  # names and types, where there are sources
 
 
 @dataclass(frozen=True)
@@ -358,7 +362,8 @@ def _split(text: str, path: Path) -> tuple[list[_Field], str]:
 def _steps(body: str) -> tuple[tuple[Step, ...], str]:
     steps: list[Step] = []
     while match := _STEP.match(body):
-        steps.append(Step(match["table"], match[0].rstrip(), _sources(match["when"] or "")))
+        sources, columns = _sources(match["when"] or ""), match["columns"] or ""
+        steps.append(Step(match["table"], match[0].rstrip(), sources, columns))
         body = body[match.end() :]
     return tuple(steps), body
 

@@ -10,13 +10,27 @@ from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header, read
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Collection, Iterable, Iterator, Mapping
     from pathlib import Path
 
     import duckdb
     import pyarrow as pa
 
 _AT_ONCE = 20_000
+# Parameters of statements that are false where no recording of the database has any of it: what
+# stands behind `WHERE $has_kernel` is not planned there.
+RECORDED = {
+    "has_kernel": "EXISTS (FROM store.thread_state)",
+    "has_calls": "EXISTS (FROM store.request)",
+    "has_turns": "EXISTS (FROM store.flow_call)"
+    " OR EXISTS (FROM store.link_causal WHERE kind <> 'direct')",
+    "has_teams": "EXISTS (FROM derive.executor_size WHERE thread_count > 1)",
+    "has_gaps": "EXISTS (FROM store.gap)",
+    "has_pauses": "EXISTS (FROM store.gap WHERE kind = 'pause')",
+    "has_steps": "EXISTS (FROM store.stamp_clock)",
+    "has_failed_takes": "EXISTS (FROM store.failed_take)",
+    "has_states": "EXISTS (FROM store.lifecycle_transition)",
+}
 
 
 class Statements:
@@ -82,9 +96,11 @@ class Statements:
         self, connection: duckdb.DuckDBPyConnection, name: str, values: Mapping[str, Any]
     ) -> None:
         """Make a temporary table of the rows of a statement, which has its name."""
+        header = self.header(name)
         text = f"CREATE OR REPLACE TEMP TABLE {name} AS\n{self.text(name)}"
-        if not may_have_rows(connection, self.header(name).sources, values):
-            text += "LIMIT 0"
+        if not may_have_rows(connection, header.sources, values):
+            columns = ", ".join(f"{column.name} {column.type}" for column in header.columns)
+            text = f"CREATE OR REPLACE TEMP TABLE {name} ({columns})"
         (statement,) = connection.extract_statements(text)
         connection.execute(statement, self._bound(name, statement, values))
 
@@ -93,6 +109,17 @@ class Statements:
     ) -> dict[str, Any]:
         inherited = {p.name: p.default for p in self.header(name).params if p.has_default}
         return {key: values.get(key, inherited.get(key)) for key in statement.named_parameters}
+
+
+def recorded(
+    connection: duckdb.DuckDBPyConnection, names: Collection[str] = tuple(RECORDED)
+) -> dict[str, bool]:
+    """Return what the recordings of a database have, by these names of RECORDED."""
+    if not names:
+        return {}
+    sql = f"SELECT {', '.join(RECORDED[name] for name in names)}"
+    (row,) = connection.execute(sql).fetchall()
+    return dict(zip(names, row, strict=True))
 
 
 def may_have_rows(

@@ -4,7 +4,9 @@
 --     to stop and to go on. So for a process, a pause lasts from its last event before the pause
 --     to its first one after it.
 -- grain: one row per process and gap
-CREATE OR REPLACE MACRO derive.process_gap(only_run) AS TABLE
+-- param: has_gaps BOOLEAN = true  The recording has gaps; false: none is looked up
+-- param: has_pauses BOOLEAN = true  Likewise pauses
+CREATE OR REPLACE MACRO derive.process_gap(only_run, has_gaps := true, has_pauses := true) AS TABLE
 WITH presence AS MATERIALIZED (
     SELECT run_id, process_id, recording_id, begin_ns, end_ns, first_ns, last_ns, is_born
     FROM derive.process_presence
@@ -62,9 +64,11 @@ following AS (
     )
 ),
 gap AS (
-    SELECT run_id, process_id, start_ns, end_ns FROM interval_of_process WHERE kind <> 'pause'
+    SELECT run_id, process_id, start_ns, end_ns
+    FROM interval_of_process
+    WHERE has_gaps AND kind <> 'pause'
     UNION ALL
-    SELECT run_id, process_id, start_ns, end_ns FROM absence
+    SELECT run_id, process_id, start_ns, end_ns FROM absence WHERE has_pauses
     UNION ALL
     SELECT run_id, process_id, begin_ns, first_ns - 1
     FROM following

@@ -15,7 +15,13 @@
 --     buffer, where nothing identifies them. Agnocast loses nothing: what a reader passed over was
 --     overwritten.
 -- grain: one row per publication and subscription of its topic that is not known to have taken it
-CREATE OR REPLACE MACRO derive.undelivered(only_run) AS TABLE
+-- param: has_gaps BOOLEAN = true  The recording has gaps; false: none is looked up
+-- param: has_pauses BOOLEAN = true  Likewise pauses
+-- param: has_steps BOOLEAN = true  A clock was set; false: no step is looked up
+-- param: has_failed_takes BOOLEAN = true  Takes failed; false: none is looked up
+CREATE OR REPLACE MACRO derive.undelivered(
+    only_run, has_gaps := true, has_pauses := true, has_steps := true, has_failed_takes := true
+) AS TABLE
 WITH arrival AS MATERIALIZED (
     SELECT
         publication_id, publisher_id, topic_name, clock_id, source_timestamp_ns, arrival_ns,
@@ -48,7 +54,7 @@ missing AS MATERIALIZED (
 ),
 gap AS MATERIALIZED (
     SELECT process_id, start_ns, covered_until_ns
-    FROM derive.process_gap(only_run)
+    FROM derive.process_gap(only_run, has_gaps, has_pauses)
     WHERE EXISTS (SELECT 1 FROM missing)
 ),
 delivered AS MATERIALIZED (
@@ -174,7 +180,7 @@ while_set AS MATERIALIZED (
         ON o.process_id = b.process_id
         AND b.end_ns >= coalesce(z.start_ns, 0)
         AND b.end_ns <= coalesce(z.end_ns, 9223372036854775807)
-    WHERE b.run_id = only_run
+    WHERE has_steps AND b.run_id = only_run
 ),
 known AS (
     SELECT
@@ -332,7 +338,9 @@ facts AS (
     ASOF LEFT JOIN gap AS g ON b.process_id = g.process_id
         AND coalesce(b.awake_until_ns, b.until_ns) >= g.start_ns
     ASOF LEFT JOIN gap AS i ON b.process_id = i.process_id AND b.arrival_ns >= i.start_ns
-    ASOF LEFT JOIN (SELECT * FROM derive.empty_take WHERE run_id = only_run) AS f
+    ASOF LEFT JOIN (
+        SELECT * FROM derive.empty_take WHERE has_failed_takes AND run_id = only_run
+    ) AS f
         ON b.subscription_id = f.subscription_id AND b.arrival_ns <= f.failed_ns
     ASOF LEFT JOIN (
         SELECT subscription_id, taken_ns, false AS for_no_stamp FROM unidentified WHERE has_no_stamp
@@ -387,7 +395,7 @@ SELECT
                 THEN 'reader_in_callback' ELSE 'subscription_ended' END
         WHEN is_agnocast AND any_taken_ns IS NOT NULL THEN 'overwritten'
         WHEN has_unidentified_take THEN 'unknown'
-        WHEN publication_id IN (SELECT publication_id FROM while_set) THEN 'unknown'
+        WHEN publication_id IN (SELECT publication_id FROM while_set WHERE has_steps) THEN 'unknown'
         WHEN NOT is_connected AND shows_none AND had_time THEN 'never_taken'
         WHEN is_before_first THEN CASE
             WHEN has_earlier_gap THEN 'unknown'

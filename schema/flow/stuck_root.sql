@@ -14,8 +14,10 @@
 --     is_cached: the last step of each beginning
 -- param: reached VARCHAR  Name of rows of path_id, root_key, take_id: how far roots came
 -- param: arrived VARCHAR  Name of rows of path_id, take_id: takes at which paths ended
+-- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
+-- param: has_states BOOLEAN = true  Nodes are managed; false: no state of one is looked up
 CREATE OR REPLACE MACRO derive.stuck_root(
-    missing, lineages, prefixes, reached, arrived, runs
+    missing, lineages, prefixes, reached, arrived, runs, has_calls := true, has_states := true
 ) AS TABLE
 -- How far each root came: its last take on the way, by depth, then time.
 WITH progress AS (
@@ -111,9 +113,11 @@ withheld AS (
         END AS reason
     FROM stuck AS s
     LEFT JOIN store.callback_instance AS c ON s.take_id = c.take_id
-    LEFT JOIN asked AS a ON c.callback_instance_id = a.callback_instance_id
-    ASOF LEFT JOIN inactive AS i ON s.publisher_id = i.publisher_id AND s.taken_ns >= i.start_ns
-    LEFT JOIN managed AS m ON i.publisher_id = m.publisher_id AND s.taken_ns < i.end_ns
+    LEFT JOIN (FROM asked WHERE has_calls) AS a ON c.callback_instance_id = a.callback_instance_id
+    ASOF LEFT JOIN (FROM inactive WHERE has_states) AS i
+        ON s.publisher_id = i.publisher_id AND s.taken_ns >= i.start_ns
+    LEFT JOIN (FROM managed WHERE has_states) AS m
+        ON i.publisher_id = m.publisher_id AND s.taken_ns < i.end_ns
     WHERE s.publisher_id IS NOT NULL AND s.publication_id IS NULL AND NOT s.is_cached
 )
 SELECT

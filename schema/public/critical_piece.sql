@@ -7,6 +7,9 @@
 -- param: runs BIGINT[]  Runs that they are of
 -- param: waits VARCHAR = 'wait_here'  Name of a table of when inputs became ready, by the clocks of
 --     the executors, where there is one
+-- param: has_kernel BOOLEAN = true  A kernel trace was read; false: nothing is looked up in it
+-- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
+-- param: has_teams BOOLEAN = true  Executors have several threads; false: each has one
 -- column: run_id BIGINT  Run
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
 -- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
@@ -40,7 +43,9 @@
 -- column: by_other_thread_id BIGINT  That thread, of another process
 -- column: by_priority INTEGER  Its priority; known for what took the CPU
 -- column: request_id BIGINT  Request whose response the callback of the part waits for
-CREATE OR REPLACE MACRO main.critical_piece(parts, runs, waits := 'wait_here') AS TABLE
+CREATE OR REPLACE MACRO main.critical_piece(
+    parts, runs, waits := 'wait_here', has_kernel := true, has_calls := true, has_teams := true
+) AS TABLE
 WITH RECURSIVE given AS MATERIALIZED (
     SELECT
         run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, part, from_ns, to_ns,
@@ -103,6 +108,7 @@ moment AS (
     UNION ALL
     SELECT position, returned_ns, sent_ns, part, callback_instance_id, outer_id, 5
     FROM call
+    WHERE has_calls
     UNION ALL
     SELECT position, at_ns, sent_ns, part, server_instance_id, request_id, place
     FROM (
@@ -118,7 +124,7 @@ moment AS (
             ], recursive := true)
         FROM call
     )
-    WHERE at_ns IS NOT NULL
+    WHERE has_calls AND at_ns IS NOT NULL
 ),
 part AS MATERIALIZED (
     SELECT
@@ -196,7 +202,7 @@ several AS (
     GROUP BY executor_id
 ),
 poll AS MATERIALIZED (
-    SELECT executor_id, start_ns, end_ns FROM derive.executor_poll('several')
+    SELECT executor_id, start_ns, end_ns FROM derive.executor_poll('several') WHERE has_teams
 ),
 -- Between two of these waits no thread was free.
 held AS MATERIALIZED (
@@ -230,12 +236,12 @@ unserved AS (
         least(greatest(m.earliest_ns, m.picked_ns), h.end_ns) AS to_ns
     FROM held_meanwhile AS m
     JOIN held AS h ON m.executor_id = h.executor_id AND m.number = h.number
-    WHERE m.earliest_ns < h.end_ns
+    WHERE has_teams AND m.earliest_ns < h.end_ns
     UNION ALL
     SELECT
         callback_instance_id, thread_id, latest_ns, greatest(earliest_ns, picked_ns), start_ns
     FROM ready
-    WHERE earliest_ns IS NOT NULL AND executor_id IN (SELECT executor_id FROM poll)
+    WHERE has_teams AND earliest_ns IS NOT NULL AND executor_id IN (SELECT executor_id FROM poll)
 ),
 -- Of several threads all have to be busy; then the one that took over was, too.
 full_house AS (
@@ -247,8 +253,9 @@ full_house AS (
     JOIN (SELECT DISTINCT executor_id, process_id FROM meanwhile) AS p
         ON b.executor_id = p.executor_id
     JOIN derive.process_clock AS c ON p.process_id = c.process_id
+    WHERE has_teams
 ),
-exclusion AS MATERIALIZED (FROM derive.callback_exclusion),
+exclusion AS MATERIALIZED (FROM derive.callback_exclusion WHERE has_teams),
 occupied AS (
     SELECT
         m.callback_instance_id, 1 AS priority, 'executor_busy' AS activity, m.from_ns, m.to_ns,
@@ -266,7 +273,7 @@ occupied AS (
     FROM meanwhile AS m
     JOIN full_house AS b
         ON m.executor_id = b.executor_id AND m.from_ns < b.end_ns AND m.to_ns > b.start_ns
-    WHERE m.is_own_thread
+    WHERE has_teams AND m.is_own_thread
     UNION ALL
     SELECT
         m.callback_instance_id, 2, 'blocked', m.from_ns, m.to_ns, m.latest_ns, m.meanwhile_id
@@ -276,6 +283,7 @@ occupied AS (
         ON m.meanwhile_callback_id = r.callback_id
         AND w.kind = r.kind
         AND w.exclusion_id = r.exclusion_id
+    WHERE has_teams
     UNION ALL
     SELECT
         u.callback_instance_id, 3, 'all_threads_busy',
@@ -286,6 +294,7 @@ occupied AS (
     FROM unserved AS u
     JOIN store.thread AS t ON u.thread_id = t.thread_id
     JOIN derive.process_clock AS c ON t.process_id = c.process_id
+    WHERE has_teams
 ),
 -- The message whose callback published for what lay in the cache, or the timer that did.
 completing AS (
@@ -462,5 +471,5 @@ SELECT
     s.by_priority,
     w.request_id
 FROM whole AS w
-LEFT JOIN main.schedule_piece('interval', runs) AS s
+LEFT JOIN (FROM main.schedule_piece('interval', runs) WHERE has_kernel) AS s
     ON w.interval_id = s.interval_id AND s.state IS NOT NULL

@@ -20,6 +20,9 @@
 -- param: max_depth, max_paths
 -- param: chains VARCHAR = 'chain_here'  Name of a table with the rows of main.flow_chain for the
 --     same arguments, where there is one
+-- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
+-- param: has_gaps BOOLEAN = true  The recording has gaps; false: none is looked up
+-- param: has_states BOOLEAN = true  Nodes are managed; false: no state of one is looked up
 -- column: run_id
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
 -- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
@@ -47,7 +50,8 @@
 CREATE OR REPLACE MACRO main.end_to_end(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL, max_depth := 32,
-    max_paths := 1000, chains := 'chain_here'
+    max_paths := 1000, chains := 'chain_here', has_calls := true, has_gaps := true,
+    has_states := true
 ) AS TABLE
 WITH RECURSIVE chain_here AS MATERIALIZED (
     SELECT
@@ -205,7 +209,9 @@ explained AS (
     SELECT
         s.path_id, s.root_key, s.reason, s.is_cached,
         s.is_cut AND coalesce(m.root_ns + l.longest_ns >= s.recorded_until_ns, true) AS is_cut
-    FROM derive.stuck_root('missing', 'lineage', 'path', 'reached', 'pair', runs) AS s
+    FROM derive.stuck_root(
+        'missing', 'lineage', 'path', 'reached', 'pair', runs, has_calls, has_states
+    ) AS s
     JOIN missing AS m ON s.path_id = m.path_id AND s.root_key = m.root_key
     JOIN longest AS l ON s.path_id = l.path_id
 ),
@@ -260,6 +266,6 @@ SELECT
     coalesce(g.covered_until_ns >= r.root_ns, false) AS is_loss_affected,
     r.is_ambiguous
 FROM ranked AS r
-ASOF LEFT JOIN gap AS g ON r.run_id = g.run_id AND r.until_ns >= g.start_ns
+ASOF LEFT JOIN (FROM gap WHERE has_gaps) AS g ON r.run_id = g.run_id AND r.until_ns >= g.start_ns
 LEFT JOIN sink AS k ON r.path_id = k.path_id
 LEFT JOIN explained AS x ON r.path_id = x.path_id AND r.root_key = x.root_key

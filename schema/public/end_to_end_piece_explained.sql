@@ -9,6 +9,7 @@
 --     callback_instance_id, callback_id, take_id, start_ns and end_ns of main.callback_instance,
 --     busy_min_ns and busy_max_ns of main.executor_wait (NULL: not known)
 -- param: runs BIGINT[]  Runs that they are of
+-- param: has_turns BOOLEAN = true  Flows may lead through caches or services; false: none does
 -- column: run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, position
 -- column: rank BIGINT  Order within the hop, from 1
 -- column: part, from_ns, to_ns, duration_ns, callback_instance_id, publication_id
@@ -17,7 +18,9 @@
 --     while a message or request waited
 -- column: busy_max_ns BIGINT [ns]  Most time
 -- column: is_turning BOOLEAN  The hop leads through a cache or a service: a part may occur twice
-CREATE OR REPLACE MACRO main.end_to_end_piece_explained(flows, trail, callbacks, runs) AS TABLE
+CREATE OR REPLACE MACRO main.end_to_end_piece_explained(
+    flows, trail, callbacks, runs, has_turns := true
+) AS TABLE
 WITH RECURSIVE flow AS NOT MATERIALIZED (
     SELECT
         flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns,
@@ -234,7 +237,7 @@ message AS (
     LEFT JOIN callback AS p ON h.previous_take_id = p.take_id
     LEFT JOIN callback AS r
         ON f.root_id = r.callback_instance_id AND f.root_kind = 'callback_instance'
-    LEFT JOIN turn AS w ON h.flow_id = w.flow_id AND h.hop = w.hop
+    LEFT JOIN (FROM turn WHERE has_turns) AS w ON h.flow_id = w.flow_id AND h.hop = w.hop
     LEFT JOIN derive.stored_take AS z ON h.take_id = z.take_id
 ),
 -- `lead` is the number of its parts before the layers of publishing, `place` that of all parts of

@@ -9,6 +9,8 @@
 --     run_queue_ns and executor_ns of the exact rows of main.arrival, where there is one
 -- param: waits VARCHAR = 'wait_here'  Name of a table of when inputs became ready, by the clocks of
 --     the executors, where there is one
+-- param: has_kernel BOOLEAN = true  A kernel trace was read; false: nothing is looked up in it
+-- param: has_teams BOOLEAN = true  Executors have several threads; false: each has one
 -- column: run_id, callback_instance_id, executor_id, thread_id, callback_id, since, origin_ns,
 --     earliest_ns, latest_ns, start_ns, wait_ns, busy_min_ns, busy_max_ns, blocked_max_ns, idle_ns,
 --     is_loss_affected, held_max_ns
@@ -27,7 +29,7 @@
 -- column: cpu_taken_by VARCHAR[]  Threads that had the CPU in both, the longest first; NULL: none
 -- column: cpu_taken_ns BIGINT[] [ns]  For how long each of them did
 CREATE OR REPLACE MACRO main.executor_wait_explained(
-    runs, arrivals := 'arrival_here', waits := 'wait_here'
+    runs, arrivals := 'arrival_here', waits := 'wait_here', has_kernel := true, has_teams := true
 ) AS TABLE
 WITH executor AS (
     SELECT executor_id, NULL::BIGINT AS until_ns
@@ -76,7 +78,7 @@ moment AS (
         unnest([coalesce(r.earliest_ns, r.latest_ns), r.latest_ns, r.start_ns]) AS at_ns
     FROM together AS t
     JOIN ready AS r ON t.callback_instance_id = r.callback_instance_id
-    WHERE r.thread_count > 1
+    WHERE has_teams AND r.thread_count > 1
 ),
 ran AS (
     SELECT
@@ -96,6 +98,7 @@ once AS (
         max(until_ns) FILTER (WHERE which = 'start') - max(until_ns) FILTER (WHERE which = 'latest')
             AS certain_ns
     FROM ran
+    WHERE has_teams
     GROUP BY callback_instance_id, callback_id
 ),
 told AS (
@@ -125,7 +128,8 @@ SELECT
     w.held_max_ns, m.meanwhile_callback_ids, m.meanwhile_ns, m.meanwhile_certain_ns,
     m.meanwhile_thread_ns, m.meanwhile_instances, r.until_arrival_ns, q.run_queue_ns,
     q.preempted_ns, q.cpu_taken_by, q.cpu_taken_ns
-FROM derive.executor_waits('ready') AS w
+FROM derive.executor_waits('ready', has_teams) AS w
 JOIN ready AS r ON w.callback_instance_id = r.callback_instance_id
-LEFT JOIN derive.executor_queue('ready') AS q ON w.callback_instance_id = q.callback_instance_id
+LEFT JOIN (FROM derive.executor_queue('ready') WHERE has_kernel) AS q
+    ON w.callback_instance_id = q.callback_instance_id
 LEFT JOIN listed AS m ON w.callback_instance_id = m.callback_instance_id

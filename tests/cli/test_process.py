@@ -96,7 +96,8 @@ def test_an_ingest_and_a_query_import_what_they_need_and_no_more(tmp_path: Path)
     """Definitions of the tables in SQLAlchemy are for users, and for upgrades of old databases."""
     trace, database = tmp_path / "trace", tmp_path / "new.duckdb"
     simulate("pipeline", trace, factor=0.01)
-    modules = imported(("ingest", trace, "--db", database), ("query", "topics", "--db", database))
+    commands = ("ingest", trace), ("query", "topics"), ("why",)
+    modules = imported(*((*words, "--db", database) for words in commands))
     assert {"duckdb", "pyarrow", "numpy"} <= modules
     assert not modules & set(ONLY_FOR_SOME)
 

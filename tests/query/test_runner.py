@@ -12,6 +12,7 @@ from msgflow.query.runner import Steps, bind, run_query
 from msgflow.query.selection import make_selection
 from msgflow.run.slice import Slice
 from msgflow.sql.header import Header, parse
+from msgflow.sql.statement import RECORDED, recorded
 from msgflow.sql.value import Value
 
 PARAMS = """\
@@ -51,6 +52,8 @@ def connection() -> duckdb.DuckDBPyConnection:
         ") AS t (run_id, topic, start_ns, is_internal)"
     )
     con.execute("CREATE TABLE simulated_time (run_id BIGINT, at_ns BIGINT, simulated_ns BIGINT)")
+    con.execute("CREATE SCHEMA store")
+    con.execute("CREATE TABLE store.simulated_time AS FROM simulated_time")
     con.execute("CREATE SCHEMA derive")
     (together,) = (each for each in objects.views() if each.name == "derive.clock_group_id")
     con.execute(together.body)
@@ -326,7 +329,7 @@ def test_clocks_that_differ_are_named(
     connection.execute("ALTER TABLE clock ADD COLUMN uncertainty_ns BIGINT")
     connection.execute("CREATE TABLE host (host_id BIGINT, clock_id BIGINT, hostname VARCHAR)")
     connection.execute("CREATE TABLE clock_uncertainty (clock_id BIGINT, uncertainty_ns BIGINT)")
-    connection.execute("CREATE SCHEMA store")
+    connection.execute("CREATE SCHEMA IF NOT EXISTS store")
     connection.execute("CREATE TABLE store.run (run_id BIGINT, clock_sync VARCHAR)")
     if in_vain:
         connection.execute("INSERT INTO store.run VALUES (1, 'messages')")
@@ -440,7 +443,7 @@ def test_how_far_corrected_clocks_can_be_wrong_is_said(
         "uncertainty_ns BIGINT)",
         "CREATE TABLE host (host_id BIGINT, clock_id BIGINT, hostname VARCHAR)",
         "CREATE TABLE clock_uncertainty (clock_id BIGINT, uncertainty_ns BIGINT)",
-        "CREATE SCHEMA store",
+        "CREATE SCHEMA IF NOT EXISTS store",
         "CREATE TABLE store.run (run_id BIGINT, clock_sync VARCHAR)",
         "INSERT INTO host VALUES (1, 1, 'alpha'), (2, 2, 'beta'), (3, 1, 'inside')",
         "INSERT INTO clock VALUES (1, 1, 1, 0)",
@@ -564,7 +567,8 @@ def test_a_step_is_made_of_what_is_known(connection: duckdb.DuckDBPyConnection) 
 def test_a_step_has_no_rows_where_its_sources_have_none(
     connection: duckdb.DuckDBPyConnection, condition: str, topics: list[str]
 ) -> None:
-    asked = header(STEPS.replace("-- A comment.\n", f"-- when: message WHERE {condition}\n"))
+    step = f"-- when: message WHERE {condition}\n-- columns: run_id INTEGER, topic VARCHAR\n"
+    asked = header(STEPS.replace("-- A comment.\n", step))
     result = run_query(connection, asked, {}, Slice("first"))
     assert result.to_arrow()["topic"].to_pylist() == topics
 
@@ -588,3 +592,26 @@ def test_a_step_that_fails_leaves_nothing(connection: duckdb.DuckDBPyConnection)
     with pytest.raises(QueryError, match="no"):
         run_query(connection, asked, {}, Slice("first"))
     assert not connection.execute("SELECT * FROM duckdb_tables() WHERE temporary").fetchall()
+
+
+def test_what_no_recording_has_is_not_looked_up(small_database: Path) -> None:
+    asked = header(
+        "-- name: example\n-- description: An example.\n-- column: found INTEGER  A row\n"
+        "SELECT 1 AS found FROM run WHERE $has_calls AND list_contains($runs, run_id) ORDER BY 1\n"
+    )
+    with duckdb.connect(str(small_database)) as con:
+        con.execute("DELETE FROM store.request")
+        assert len(run_query(con, asked, {})) == 0
+        columns = con.execute("DESCRIBE store.request").fetchall()
+        given = [1 if null == "NO" else None for _, _, null, *_ in columns]
+        con.execute(f"INSERT INTO store.request VALUES ({', '.join('?' * len(given))})", given)
+        assert len(run_query(con, asked, {})) == 1
+
+
+def test_all_that_a_recording_may_lack_is_known(small_database: Path) -> None:
+    with duckdb.connect(str(small_database)) as con:
+        assert recorded(con).keys() == RECORDED.keys()
+        assert recorded(con, ["has_gaps"]) == {"has_gaps": False}
+        con.execute("INSERT INTO store.gap (run_id, trace_id, kind) VALUES (1, 1, 'pause')")
+        assert recorded(con, ["has_pauses", "has_gaps"]) == {"has_pauses": True, "has_gaps": True}
+        assert recorded(con, []) == {}

@@ -25,7 +25,7 @@ CREATE TABLE derive.subscription_life (run_id BIGINT DEFAULT 1, subscription_id 
     host_end_ns BIGINT DEFAULT 10_000_000_000, only_thread_id BIGINT DEFAULT 1,
     shows_takes BOOLEAN DEFAULT true, is_agnocast BOOLEAN DEFAULT false);
 CREATE TABLE gap (process_id BIGINT DEFAULT 1, start_ns BIGINT, covered_until_ns BIGINT);
-CREATE MACRO derive.process_gap(only_run) AS TABLE FROM gap;
+CREATE MACRO derive.process_gap(only_run, has_gaps := true, has_pauses := true) AS TABLE FROM gap;
 CREATE TABLE store.publisher (publisher_id BIGINT, created_ns BIGINT,
     process_id BIGINT DEFAULT 1);
 CREATE TABLE derive.copied_pair (publisher_id BIGINT, subscription_id BIGINT);

@@ -46,7 +46,8 @@ CREATE TABLE missed (process_id BIGINT DEFAULT 1, start_ns BIGINT, covered_until
 CREATE TABLE rival (take_id BIGINT);
 CREATE TABLE unstamped (process_id BIGINT, publisher_id BIGINT, is_without_event BOOLEAN);
 CREATE MACRO derive.unstamped_call(only_run) AS TABLE FROM unstamped;
-CREATE MACRO derive.process_gap(only_run) AS TABLE FROM missed;
+CREATE MACRO derive.process_gap(only_run, has_gaps := true, has_pauses := true) AS TABLE
+FROM missed;
 CREATE MACRO derive.take_candidate(only_run) AS TABLE FROM rival;
 INSERT INTO store.subscription (created_ns) VALUES (0);
 INSERT INTO store.process (process_id) VALUES (1), (2), (9);

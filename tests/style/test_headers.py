@@ -19,7 +19,7 @@ from msgflow.db import objects
 from msgflow.query.runner import RESERVED
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
 from msgflow.sql.header import SCHEMAS, Header
-from msgflow.sql.statement import internal_sql
+from msgflow.sql.statement import RECORDED, internal_sql
 from msgflow.view.page_query import DIRECTORY, page_query
 
 FILES = sql_files()
@@ -42,7 +42,7 @@ TABLES = {
     "vertices": "(SELECT 8::BIGINT AS key, 'take' AS kind, 1::BIGINT AS id, 0 AS depth)",
 }
 # What many statements take; see `msgflow.sql.header`.
-UNDECLARED = {"run", "run_id", "runs", "start_ns", "end_ns", "origin_ns"}
+UNDECLARED = {"run", "run_id", "runs", "start_ns", "end_ns", "origin_ns", *RECORDED}
 INTERNAL = [file for file in FILES if file.layer == "internal"]
 PAGE_QUERIES = [page_query(path.stem) for path in sorted(DIRECTORY.glob("*.sql"))]
 LAYER_OF = {file.header.name: file.layer for file in FILES}
@@ -146,11 +146,14 @@ def test_columns_of_a_query_are_those_of_its_output(
     values = {
         param.name: param.default if param.has_default else None for param in file.header.params
     }
-    values |= {"runs": [1], "start_ns": 0, "end_ns": 1}
+    values |= {"runs": [1], "start_ns": 0, "end_ns": 1} | dict.fromkeys(RECORDED, True)
     *steps, last = (connection.extract_statements(text)[0] for text in file.header.statements)
     with connection.cursor() as cursor:
-        for step in steps:
+        for step, made in zip(steps, file.header.steps, strict=True):
             cursor.execute(step, {name: values[name] for name in step.named_parameters})
+            if made.sources:
+                cursor.execute(f"CREATE TEMP TABLE empty_step ({made.columns})")
+                assert described(cursor.table("empty_step")) == described(cursor.table(made.table))
         bound = {name: values[name] for name in last.named_parameters}
         assert described(cursor.sql(file.header.body, params=bound)) == declared(file)
 
@@ -192,6 +195,7 @@ def test_headers_of_what_the_program_asks_are_those_of_its_sql(
     named = {param.name for param in file.header.params}
     assert named | UNDECLARED == statement.named_parameters | UNDECLARED
     values = {"run_id": 1, "runs": [1], "start_ns": 0, "end_ns": 1, "kind": "take", "id": 1}
+    values |= dict.fromkeys(RECORDED, True)
     values |= {p.name: [1, 1] if p.type.endswith("[]") else 1 for p in file.header.params} | values
     # Only what is shown as a result declares columns; some of that reads what is made for it.
     made = ("changes", "fleet_comparison", "bag_topic", "change_part")

@@ -20,10 +20,10 @@
                              `pytest --update-golden` write it, and read what it wrote
 
 A query is run as `Database.query` runs it; what the program asks for itself (internal.<name>) of
-run 1, likewise over tables of scratch, sorted where it has no order; a page query (view.<name>) of run 1, with times from 0
-and a window of 4000 ns where the parameters say nothing else; a view (its full name, such as
-`main.node`) or a finding (`finding.NAME`) is read whole, a table macro called with its arguments,
-all sorted by all columns. An empty field is NULL, "" is an empty text. Lines that begin with # are
+run 1, likewise over tables of scratch, sorted where it has no order; a page query (view.<name>) of
+run 1, with times from 0 and a window of 4000 ns where the parameters say nothing else; a view (its
+full name, such as `main.node`) or a finding (`finding.NAME`) is read whole, a table macro called
+with its arguments, all sorted by all columns. An empty field is NULL, "" is an empty text. Lines that begin with # are
 comments. Tables of BASE that a case leaves out have one row, of key 1.
 """
 
@@ -58,7 +58,7 @@ from msgflow.query.runner import run_query
 from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import Slice
 from msgflow.sql.quoting import literal
-from msgflow.sql.statement import Statements, internal_sql
+from msgflow.sql.statement import RECORDED, Statements, internal_sql
 from msgflow.view.page_query import DIRECTORY, Scratch, run_page_query
 
 Rows = list[list[str | None]]
@@ -84,6 +84,7 @@ _PAGE_QUERY = "view."
 _INTERNAL = "internal."
 _FINDING = "finding."
 _FRAME = {"run": 1, "run_id": 1, "runs": [1], "origin_ns": 0, "start_ns": 0, "end_ns": 4_000}
+_FRAME |= dict.fromkeys(RECORDED, True)
 _BENCH = pytest.StashKey["Bench"]()
 # (name, type, whether it may be NULL) of the columns of each table of the store.
 _COLUMNS: dict[str, list[tuple[str, str, bool]]] = {}

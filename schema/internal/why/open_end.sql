@@ -6,6 +6,9 @@
 --     time that the callback of a message takes is not what uses it.
 -- grain: as main.dead_end
 -- when: main.timer WHERE node_id IN (SELECT node_id FROM main.subscription WHERE NOT is_internal)
+-- column: node_id BIGINT  As in main.dead_end
+-- column: timer_id BIGINT  Likewise
+-- column: topic_name VARCHAR  Likewise
 WITH spoken AS (
     SELECT topic_name
     FROM main.publisher

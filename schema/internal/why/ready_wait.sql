@@ -7,4 +7,4 @@ WITH executor AS (
     FROM derive.executor_size
     WHERE list_contains($runs, run_id)
 )
-FROM derive.callback_ready('executor')
+FROM derive.callback_ready('executor', $has_calls, $has_teams)

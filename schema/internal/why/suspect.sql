@@ -15,7 +15,7 @@
 WITH span AS (
     SELECT
         run_id, least(end_ns, $end_ns) - greatest(start_ns, $start_ns) AS length_ns,
-        run_id IN (SELECT run_id FROM main.thread_state) AS has_kernel
+        run_id IN (SELECT run_id FROM main.thread_state WHERE $has_kernel) AS has_kernel
     FROM main.run
     WHERE list_contains($runs, run_id)
 ),
@@ -95,7 +95,7 @@ holding AS (
                 coalesce(server, 'a server that is not recorded'), returned_ns - sent_ns
             ) AS server
         FROM main.waited_call
-        WHERE list_contains($runs, run_id)
+        WHERE $has_calls AND list_contains($runs, run_id)
         GROUP BY callback_instance_id
     ) AS w
         ON i.callback_instance_id = w.callback_instance_id
@@ -201,7 +201,7 @@ sampled AS (
 -- Executors of several threads that look for work again and again.
 awake AS (
     SELECT n.full_name AS node, min(f.detail) AS detail
-    FROM main.finding AS f
+    FROM store.finding AS f
     JOIN main.process AS p
         ON f.run_id = p.run_id
         AND starts_with(f.subject, printf('%s %d on ', coalesce(p.name, '?'), p.pid))

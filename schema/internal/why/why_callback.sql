@@ -58,7 +58,7 @@ call AS MATERIALIZED (
     FROM main.waited_call AS w
     JOIN main.callback_instance AS i ON w.callback_instance_id = i.callback_instance_id
     JOIN chosen AS c ON i.callback_id = c.callback_id
-    WHERE list_contains($runs, w.run_id)
+    WHERE $has_calls AND list_contains($runs, w.run_id)
     UNION ALL
     SELECT
         w.callback_instance_id, w.node, w.label, w.service_name,
@@ -117,7 +117,8 @@ taken AS (
     LEFT JOIN main.thread AS h ON p.preemptor_thread_id = h.thread_id
     LEFT JOIN main.other_thread AS o ON p.preemptor_other_thread_id = o.other_thread_id
     -- An idle CPU is not taken.
-    WHERE p.start_ns >= $start_ns AND p.start_ns < $end_ns AND coalesce(o.tid <> 0, true)
+    WHERE $has_kernel
+        AND p.start_ns >= $start_ns AND p.start_ns < $end_ns AND coalesce(o.tid <> 0, true)
     GROUP BY ALL
 ),
 instance AS MATERIALIZED (
@@ -137,7 +138,8 @@ instance AS MATERIALIZED (
         coalesce(m.other_run_ns, 0) AS other_run_ns
     FROM chosen AS c
     JOIN main.callback_instance AS i ON c.callback_id = i.callback_id
-    LEFT JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
+    LEFT JOIN (FROM main.callback_schedule WHERE $has_kernel) AS s
+        ON i.callback_instance_id = s.callback_instance_id
     LEFT JOIN explained_wait AS w ON i.callback_instance_id = w.callback_instance_id
     LEFT JOIN (
         SELECT callback_instance_id, sum(call_ns)::BIGINT AS call_ns

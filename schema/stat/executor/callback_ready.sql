@@ -10,7 +10,11 @@
 -- grain: one row per callback instance that is not nested in another
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
 --     instances that began after the last of these moments are left out (where all are NULL: none)
-CREATE OR REPLACE MACRO derive.callback_ready(executors) AS TABLE
+-- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
+-- param: has_teams BOOLEAN = true  Executors have several threads; false: each has one
+CREATE OR REPLACE MACRO derive.callback_ready(
+    executors, has_calls := true, has_teams := true
+) AS TABLE
 WITH sized AS (
     SELECT e.executor_id, e.until_ns, s.thread_count, x.kind = 'events' AS is_in_order
     FROM query_table(executors) AS e
@@ -25,7 +29,7 @@ release AS (
             PARTITION BY r.thread_id ORDER BY r.start_ns, r.callback_instance_id
             ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING
         )) AS latest_ns
-    FROM derive.callback_release('sized') AS r
+    FROM derive.callback_release('sized', has_calls) AS r
     JOIN sized AS s ON r.executor_id = s.executor_id
 ),
 -- A thread among several picks what it will run when it begins to look, not when it runs it:
@@ -42,7 +46,7 @@ picked AS (
         r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.start_ns,
         r.previous_start_ns, r.since, r.origin_ns, r.subscribed_ns, r.latest_ns, r.thread_count,
         s.start_ns
-    FROM (SELECT * FROM release WHERE thread_count > 1) AS r
+    FROM (SELECT * FROM release WHERE has_teams AND thread_count > 1) AS r
     ASOF LEFT JOIN (
         SELECT e.thread_id, e.start_ns
         FROM store.executor_state AS e

@@ -7,7 +7,8 @@
 -- grain: one row per callback instance that is not nested in another
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
 --     instances that began after the last of these moments are left out (where all are NULL: none)
-CREATE OR REPLACE MACRO derive.callback_release(executors) AS TABLE
+-- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
+CREATE OR REPLACE MACRO derive.callback_release(executors, has_calls := true) AS TABLE
 -- A callback may have run elsewhere before.
 WITH every_run AS (
     SELECT
@@ -92,4 +93,4 @@ SELECT
     m.returned_ns
 FROM started AS i
 LEFT JOIN message AS m ON i.take_id = m.take_id
-LEFT JOIN request AS q ON i.request_id = q.request_id
+LEFT JOIN (FROM request WHERE has_calls) AS q ON i.request_id = q.request_id

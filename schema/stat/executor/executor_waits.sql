@@ -2,12 +2,15 @@
 --     main.executor_wait.
 -- grain: one row per waiting callback instance
 -- param: waits VARCHAR  Name of rows as of derive.callback_ready
-CREATE OR REPLACE MACRO derive.executor_waits(waits) AS TABLE
+-- param: has_teams BOOLEAN = true  Executors have several threads; false: each has one
+CREATE OR REPLACE MACRO derive.executor_waits(waits, has_teams := true) AS TABLE
 WITH stretch AS MATERIALIZED (
     SELECT executor_id, start_ns, end_ns, before_ns, callback_instance_id, previous_end_ns
     FROM derive.executor_busy
+    -- The rows of several threads are of no callback instance.
+    WHERE has_teams OR callback_instance_id IS NOT NULL
 ),
-exclusion AS MATERIALIZED (FROM derive.callback_exclusion),
+exclusion AS MATERIALIZED (FROM derive.callback_exclusion WHERE has_teams),
 -- The one thread of an executor starts a callback when nothing else runs: up to there it was busy
 -- for as long as it was in all before, and not at all from the end of the last one.
 ready AS MATERIALIZED (
@@ -64,7 +67,7 @@ excluding AS (
     FROM derive.executor_run AS r
     JOIN derive.executor_size AS s ON r.executor_id = s.executor_id
     JOIN exclusion AS e ON r.callback_id = e.callback_id
-    WHERE r.end_ns > r.start_ns AND s.thread_count > 1
+    WHERE has_teams AND r.end_ns > r.start_ns AND s.thread_count > 1
 ),
 blocking AS (
     SELECT
@@ -96,6 +99,7 @@ blocked AS (
         SELECT y.callback_instance_id, y.which, y.at_ns, y.until_ns, e.kind, e.exclusion_id
         FROM busy AS y
         JOIN exclusion AS e ON y.callback_id = e.callback_id
+        WHERE has_teams
     ) AS m
     ASOF LEFT JOIN blocking AS b
         ON m.kind = b.kind AND m.exclusion_id = b.exclusion_id AND m.at_ns >= b.start_ns
@@ -111,7 +115,7 @@ drowsy AS MATERIALIZED (
     -- What a thread has picked does not wait for work that others wait for.
     SELECT callback_instance_id, executor_id, 'picked', greatest(picked_ns, earliest_ns)
     FROM ready
-    WHERE thread_count > 1
+    WHERE has_teams AND thread_count > 1
 ),
 -- Whether an executor waits at all is looked up where none of its callbacks shows it.
 silent AS (SELECT executor_id FROM ready GROUP BY executor_id HAVING max(wait_start_ns) IS NULL),
@@ -133,7 +137,7 @@ idle AS (
 until AS (
     SELECT callback_instance_id, 'busy_' || which AS what, until_ns FROM busy
     UNION ALL
-    SELECT callback_instance_id, 'blocked_' || which, until_ns FROM blocked
+    SELECT callback_instance_id, 'blocked_' || which, until_ns FROM blocked WHERE has_teams
     UNION ALL
     SELECT callback_instance_id, 'idle_' || which, until_ns FROM idle
 ),
