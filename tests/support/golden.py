@@ -23,8 +23,8 @@ A query is run as `Database.query` runs it; what the program asks for itself (in
 run 1, likewise over tables of scratch, sorted where it has no order; a page query (view.<name>) of
 run 1, with times from 0 and a window of 4000 ns where the parameters say nothing else; a view (its
 full name, such as `main.node`) or a finding (`finding.NAME`) is read whole, a table macro called
-with its arguments, all sorted by all columns. An empty field is NULL, "" is an empty text. Lines that begin with # are
-comments. Tables of BASE that a case leaves out have one row, of key 1.
+with its arguments, all sorted by all columns. An empty field is NULL, "" is an empty text. Lines
+that begin with # are comments. Tables of BASE that a case leaves out have one row, of key 1.
 """
 
 from __future__ import annotations
