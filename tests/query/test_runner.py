@@ -596,7 +596,7 @@ def test_a_step_that_fails_leaves_nothing(connection: duckdb.DuckDBPyConnection)
 
 def test_what_no_recording_has_is_not_looked_up(small_database: Path) -> None:
     asked = header(
-        "-- name: example\n-- description: An example.\n-- column: found INTEGER  A row\n"
+        "-- description: An example.\n-- column: found INTEGER  A row\n"
         "SELECT 1 AS found FROM run WHERE $has_calls AND list_contains($runs, run_id) ORDER BY 1\n"
     )
     with duckdb.connect(str(small_database)) as con:
