@@ -16,7 +16,7 @@
 -- param: take BIGINT = NULL  Instead, the longest flow to this take_id; on the command line:
 --     msgflow flow --take ID --why
 -- param: case
--- param: by VARCHAR {piece|node|part} = 'piece'  Rows by piece, by node, or by activity  and state
+-- param: by VARCHAR {piece|node|part} = 'piece'  Rows by piece, by node, or by activity and state
 -- param: detail VARCHAR {short|full} = 'short'  full: every piece and layer of publishing
 -- param: from_event, to_event, max_depth, max_paths
 -- column: run_id

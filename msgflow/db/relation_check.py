@@ -1,6 +1,6 @@
 """Relations between tables, and the rows that break them: they refer to a row that is missing.
 
-A row of another run is none: nothing is linked across runs.
+A row of another run does not count: nothing is linked across runs.
 
 `store.sql` marks the columns that refer to another table. The databases have no foreign keys.
 """

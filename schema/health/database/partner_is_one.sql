@@ -1,4 +1,4 @@
--- title: A row has several partners, or two do not name each other
+-- title: A row has several partners, or two that belong together do not name each other
 -- description: A publication has one direct cause at most. A subscription receives it at most once
 --     by each way: through the ring buffer of its process, and through the middleware, whose copy
 --     it drops; only a poll of Agnocast may get again what it got before. A take comes from one

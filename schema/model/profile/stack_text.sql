@@ -1,7 +1,7 @@
 -- description: What perf wrote of each stack, and its calls, the outermost first. Where a function
 --     keeps no frame pointer, what comes above it in the stack is no code: it is cut off. Python
 --     names its functions as 'py::function:file', in a map of its own: C++ may have a namespace py.
---     The function that ran is the innermost one; but what the interpreter, the C library and the
+--     The function that ran is the innermost one; but what the interpreter, libc and the
 --     kernel do for a function of Python alone, that function does. Other libraries, such as numpy,
 --     have functions of their own.
 -- grain: one row per different text
@@ -33,10 +33,13 @@ whole AS (
             lambda call: CASE
                 WHEN call.function LIKE 'py::%' AND regexp_matches(call.file, '/perf-\d+\.map$')
                     THEN 'python'
-                WHEN regexp_matches(
-                    call.file,
-                    '^\[(kernel|vdso)|/(lib)?python3[^/]*$|/(libc|ld-linux[^/]*)\.so[^/]*$'
-                ) THEN 'interpreter'
+                -- In brackets stand the kernel and its modules.
+                WHEN call.file LIKE '[%' AND call.file <> '[unknown]'
+                    OR regexp_matches(
+                        call.file,
+                        '/(lib)?python3[^/]*$|/(libc|libpthread|ld)(-[\d.]+|-linux[^/]*)?\.so[^/]*$'
+                    )
+                    THEN 'interpreter'
                 ELSE 'library'
             END
         ) AS kinds
