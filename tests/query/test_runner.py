@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import duckdb
@@ -615,3 +616,33 @@ def test_all_that_a_recording_may_lack_is_known(small_database: Path) -> None:
         con.execute("INSERT INTO store.gap (run_id, trace_id, kind) VALUES (1, 1, 'pause')")
         assert recorded(con, ["has_pauses", "has_gaps"]) == {"has_pauses": True, "has_gaps": True}
         assert recorded(con, []) == {}
+
+
+@pytest.mark.parametrize(
+    ("table", "kind", "threads", "facts"),
+    [
+        ("store.thread_state", "", 0, {"has_kernel"}),
+        ("store.request", "", 0, {"has_calls"}),
+        ("store.flow_call", "", 0, {"has_turns"}),
+        ("store.link_causal", "direct", 0, set()),
+        ("store.link_causal", "queue", 0, {"has_turns"}),
+        ("derive.executor_size", "", 1, set()),
+        ("derive.executor_size", "", 2, {"has_teams"}),
+        ("store.gap", "loss", 0, {"has_gaps"}),
+        ("store.gap", "pause", 0, {"has_gaps", "has_pauses"}),
+        ("store.stamp_clock", "", 0, {"has_steps"}),
+        ("store.failed_take", "", 0, {"has_failed_takes"}),
+        ("store.lifecycle_transition", "", 0, {"has_states"}),
+    ],
+)
+def test_what_a_recording_has_follows_from_rows(
+    table: str, kind: str, threads: int, facts: set[str]
+) -> None:
+    tables = {name for text in RECORDED.values() for name in re.findall(r"FROM (\S+?)[ )]", text)}
+    assert table in tables
+    with duckdb.connect() as con:
+        con.execute("CREATE SCHEMA store; CREATE SCHEMA derive")
+        for name in tables:
+            con.execute(f"CREATE TABLE {name} (kind VARCHAR, thread_count BIGINT)")
+        con.execute(f"INSERT INTO {table} VALUES (?, ?)", [kind, threads])
+        assert {name for name, has in recorded(con).items() if has} == facts
