@@ -49,7 +49,10 @@ def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
     catalogue = load()
     for each in catalogue.staged.values():
         con.execute(each.create_table_sql("raw", catalogue.labels, catalogue.interrupts))
-    con.execute((resource_directory("schema") / "staging.sql").read_text(encoding="utf-8"))
+    text = (resource_directory("schema") / "staging.sql").read_text(encoding="utf-8")
+    # One by one: what looks at a statement before it runs, such as EXPLAIN, sees it.
+    for statement in con.extract_statements(text):
+        con.execute(statement)
 
 
 def empty_tables(con: duckdb.DuckDBPyConnection) -> set[str]:
