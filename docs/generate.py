@@ -25,6 +25,7 @@ from msgflow.db.store_table import store_file
 from msgflow.db.tables import STORE
 from msgflow.ingest import model, staging
 from msgflow.query.catalogue import load_queries, query_names
+from msgflow.sql.statement import RECORDED
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -235,7 +236,11 @@ def trust() -> str:
 
 def data_model() -> str:
     """Return the text of data-model.md."""
-    public = sorted(objects.load("public"), key=lambda header: header.name)
+    # What a recording has, msgflow fills in; users need not.
+    public = [
+        replace(header, params=tuple(p for p in header.params if p.name not in RECORDED))
+        for header in sorted(objects.load("public"), key=lambda header: header.name)
+    ]
     columns = _often(_column(column) for header in public for column in header.columns)
     params = _often(_param(param, header.kind) for header in public for param in header.params)
     known = dict.fromkeys([*columns, *params], "as above")
