@@ -341,13 +341,12 @@ FROM late
 UNION ALL
 SELECT
     'stale', node, what, path, cost_ns, matters,
-    printf('its %s uses what it was told before', what)
-    || CASE WHEN inputs IS NULL
-        THEN printf(': messages wait for it for %s of %s',
-            main.duration_text(cost_ns), main.duration_text(path_ns))
-        ELSE printf(': messages come %s and wait for up to %s, if it uses them'
-            || ' (msgflow suggest links)',
-            inputs, main.duration_text(cost_ns))
+    CASE WHEN inputs IS NULL
+        THEN printf('its %s uses what it was told before: messages wait for it for %s of %s',
+            what, main.duration_text(cost_ns), main.duration_text(path_ns))
+        ELSE printf('its %s may use what it was told before: messages come %s and wait for up to'
+            || ' %s (msgflow suggest links)',
+            what, inputs, main.duration_text(cost_ns))
     END
 FROM sampled
 UNION ALL
