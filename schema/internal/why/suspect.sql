@@ -1,7 +1,8 @@
 -- title: What makes data late, or lets them get lost
 -- description: Everything on the paths of an explanation that costs time or messages, whether it
 --     matters or not. The cost is by how much the data at the end of the path are older because of
---     it: 95 % of the messages are delayed by no more. It reads what an explanation has by then.
+--     it: 95 % of the messages are delayed by no more. By how much half of them are, where it only
+--     may be so: what is certain comes before a doubt. It reads what an explanation has by then.
 -- grain: one row per kind, culprit and path
 -- param: asked_ns BIGINT  Begin of what was asked for: with the warm-up, which start_ns leaves out
 -- column: kind VARCHAR  'callback', 'executor', 'cpu', 'service', 'queue', 'lost', 'late_start',
@@ -192,8 +193,9 @@ sampled AS (
     WHERE p.part = 'cache'
     UNION ALL
     SELECT
-        k.node, printf('Timer(%.10g ms)', k.period_ns / 1e6), p.path, p.path_ns, k.period_ns,
-        k.inputs, k.period_ns >= 20_000_000
+        k.node, printf('Timer(%.10g ms)', k.period_ns / 1e6), p.path, p.path_ns, k.period_ns // 2,
+        printf('%s and wait for up to %s', k.inputs, main.duration_text(k.period_ns)),
+        k.period_ns >= 20_000_000
     FROM kept AS k
     JOIN (SELECT DISTINCT path, path_ns FROM place) AS p
         ON ends_with(p.path, ' → ' || k.topic_name || ' → ' || k.node)
@@ -344,9 +346,9 @@ SELECT
     CASE WHEN inputs IS NULL
         THEN printf('its %s uses what it was told before: messages wait for it for %s of %s',
             what, main.duration_text(cost_ns), main.duration_text(path_ns))
-        ELSE printf('its %s may use what it was told before: messages come %s and wait for up to'
-            || ' %s (msgflow suggest links)',
-            what, inputs, main.duration_text(cost_ns))
+        ELSE printf('its %s may use what it was told before: messages come %s'
+            || ' (msgflow suggest links)',
+            what, inputs)
     END
 FROM sampled
 UNION ALL
