@@ -75,9 +75,14 @@ other AS (
         greatest(c.other_ns, c.beside_ns) AS other_ns,
         -- The groups of callbacks are not in a trace: a thread may be free, and must not run them.
         c.beside_ns > 2 * c.other_ns AS is_supposed, c.other_run_ns,
-        o.node AS other_node, o.label AS other_label, o.callback_id
+        o.node AS other_node, o.label AS other_label, o.callback_id,
+        s.server AS likely_server, s.service_name AS likely_service
     FROM callback AS c
     JOIN main.callback_label AS o ON c.other_id = o.callback_id
+    -- On a path it is known what it waits for, as far as times show it.
+    LEFT JOIN why_callback AS s
+        ON o.node = s.node AND o.label = s.label AND NOT s.is_recorded
+        AND s.call_ns > s.computed_ns
 ),
 -- How long those run that keep others waiting, and the service that they wait for themselves.
 holding AS (
@@ -258,13 +263,22 @@ SELECT
 FROM computing
 UNION ALL
 SELECT
-    'executor', CASE WHEN h.is_calling THEN h.server ELSE o.other_node END, o.other_label, o.path,
-    o.other_ns, o.other_ns >= o.limit_ns AND o.other_ns >= 0.1 * o.path_ns,
-    CASE WHEN h.is_calling
-        THEN printf(
-            'its service %s, for which %s waits (%s),', h.service_name, o.other_label,
-            main.duration_text(h.run_ns)
-        )
+    'executor',
+    CASE WHEN h.is_calling THEN h.server ELSE coalesce(o.likely_server, o.other_node) END,
+    o.other_label, o.path, o.other_ns,
+    o.other_ns >= o.limit_ns AND o.other_ns >= 0.1 * o.path_ns,
+    CASE
+        WHEN h.is_calling
+            THEN printf(
+                'its service %s, for which %s waits (%s),', h.service_name, o.other_label,
+                main.duration_text(h.run_ns)
+            )
+        WHEN o.likely_server IS NOT NULL
+            THEN printf(
+                'its service %s, for which %s waits (%s) as far as times show (requests are'
+                || ' recorded since Kilted),',
+                o.likely_service, o.other_label, main.duration_text(h.run_ns)
+            )
         ELSE printf('its callback %s (%s)', o.other_label, main.duration_text(h.run_ns))
     END
     || printf(
