@@ -1,7 +1,8 @@
 -- title: What makes data late, or lets them get lost
 -- description: Everything on the paths of an explanation that costs time or messages, whether it
 --     matters or not. The cost is by how much the data at the end of the path are older because of
---     it: 95 % of the messages are delayed by no more. It reads what an explanation has by then.
+--     it: 95 % of the messages are delayed by no more. By how much half of them are, where it only
+--     may be so: what is certain comes before a doubt. It reads what an explanation has by then.
 -- grain: one row per kind, culprit and path
 -- param: asked_ns BIGINT  Begin of what was asked for: with the warm-up, which start_ns leaves out
 -- column: kind VARCHAR  'callback', 'executor', 'cpu', 'service', 'queue', 'lost', 'late_start',
@@ -74,9 +75,14 @@ other AS (
         greatest(c.other_ns, c.beside_ns) AS other_ns,
         -- The groups of callbacks are not in a trace: a thread may be free, and must not run them.
         c.beside_ns > 2 * c.other_ns AS is_supposed, c.other_run_ns,
-        o.node AS other_node, o.label AS other_label, o.callback_id
+        o.node AS other_node, o.label AS other_label, o.callback_id,
+        s.server AS likely_server, s.service_name AS likely_service
     FROM callback AS c
     JOIN main.callback_label AS o ON c.other_id = o.callback_id
+    -- On a path it is known what it waits for, as far as times show it.
+    LEFT JOIN why_callback AS s
+        ON o.node = s.node AND o.label = s.label AND NOT s.is_recorded
+        AND s.call_ns > s.computed_ns
 ),
 -- How long those run that keep others waiting, and the service that they wait for themselves.
 holding AS (
@@ -192,8 +198,9 @@ sampled AS (
     WHERE p.part = 'cache'
     UNION ALL
     SELECT
-        k.node, printf('Timer(%.10g ms)', k.period_ns / 1e6), p.path, p.path_ns, k.period_ns,
-        k.inputs, k.period_ns >= 20_000_000
+        k.node, printf('Timer(%.10g ms)', k.period_ns / 1e6), p.path, p.path_ns, k.period_ns // 2,
+        printf('%s and wait for up to %s', k.inputs, main.duration_text(k.period_ns)),
+        k.period_ns >= 20_000_000
     FROM kept AS k
     JOIN (SELECT DISTINCT path, path_ns FROM place) AS p
         ON ends_with(p.path, ' → ' || k.topic_name || ' → ' || k.node)
@@ -256,13 +263,22 @@ SELECT
 FROM computing
 UNION ALL
 SELECT
-    'executor', CASE WHEN h.is_calling THEN h.server ELSE o.other_node END, o.other_label, o.path,
-    o.other_ns, o.other_ns >= o.limit_ns AND o.other_ns >= 0.1 * o.path_ns,
-    CASE WHEN h.is_calling
-        THEN printf(
-            'its service %s, for which %s waits (%s),', h.service_name, o.other_label,
-            main.duration_text(h.run_ns)
-        )
+    'executor',
+    CASE WHEN h.is_calling THEN h.server ELSE coalesce(o.likely_server, o.other_node) END,
+    o.other_label, o.path, o.other_ns,
+    o.other_ns >= o.limit_ns AND o.other_ns >= 0.1 * o.path_ns,
+    CASE
+        WHEN h.is_calling
+            THEN printf(
+                'its service %s, for which %s waits (%s),', h.service_name, o.other_label,
+                main.duration_text(h.run_ns)
+            )
+        WHEN o.likely_server IS NOT NULL
+            THEN printf(
+                'its service %s, for which %s waits (%s) as far as times show (requests are'
+                || ' recorded since Kilted),',
+                o.likely_service, o.other_label, main.duration_text(h.run_ns)
+            )
         ELSE printf('its callback %s (%s)', o.other_label, main.duration_text(h.run_ns))
     END
     || printf(
@@ -341,13 +357,12 @@ FROM late
 UNION ALL
 SELECT
     'stale', node, what, path, cost_ns, matters,
-    printf('its %s uses what it was told before', what)
-    || CASE WHEN inputs IS NULL
-        THEN printf(': messages wait for it for %s of %s',
-            main.duration_text(cost_ns), main.duration_text(path_ns))
-        ELSE printf(': messages come %s and wait for up to %s, if it uses them'
+    CASE WHEN inputs IS NULL
+        THEN printf('its %s uses what it was told before: messages wait for it for %s of %s',
+            what, main.duration_text(cost_ns), main.duration_text(path_ns))
+        ELSE printf('its %s may use what it was told before: messages come %s'
             || ' (msgflow suggest links)',
-            inputs, main.duration_text(cost_ns))
+            what, inputs)
     END
 FROM sampled
 UNION ALL

@@ -8,7 +8,7 @@
 -- column: kinds VARCHAR[]  What it does, the worst first: 'callback', 'executor', 'cpu',
 --     'service', 'queue', 'lost', 'late_start', 'stale' or 'way'; or the name of a finding
 -- column: cost_ns BIGINT [ns]  By how much the data at the end of a path are older because of it;
---     NULL: of findings
+--     half of that where it only may be so; NULL: of findings
 -- column: path VARCHAR [path]  Path that it delays most
 -- column: sentence VARCHAR  The sentence
 WITH step AS (

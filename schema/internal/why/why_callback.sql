@@ -37,7 +37,9 @@ within AS (
         v.node_id, j.end_ns - j.start_ns AS served_ns
     FROM chosen AS c
     JOIN main.callback_instance AS i ON c.callback_id = i.callback_id
-    JOIN main.client AS q ON i.process_id = q.process_id
+    -- A process may have several clients of one service.
+    JOIN (SELECT DISTINCT run_id, process_id, service_name FROM main.client) AS q
+        ON i.process_id = q.process_id
     JOIN main.service AS v ON q.run_id = v.run_id AND q.service_name = v.service_name
     ANTI JOIN main.request AS r ON v.service_id = r.service_id
     JOIN main.callback AS s ON v.service_id = s.service_id

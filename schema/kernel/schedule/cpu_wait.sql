@@ -1,6 +1,6 @@
 -- description: Waits of threads for a CPU: preempted, or woken. A wait is cut where the thread goes
---     to another CPU. Where the kernel trace does not say that, a thread that was woken waits for
---     the CPU on which it goes on; else for the one that its waking names.
+--     to another CPU. A woken thread waits for the CPU that its waking names, until it is moved;
+--     where the trace has no migrations, for that on which it goes on.
 -- grain: one row per wait and CPU
 -- when: staging.schedule_interval
 WITH migration AS (
