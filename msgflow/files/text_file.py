@@ -18,7 +18,9 @@ MOST_BYTES = 1_000_000
 def read_text(path: Path, what: str, hint: str) -> str:
     """Return the text of a file."""
     try:
-        with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+        with open(
+            path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)
+        ) as file:
             if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
                 raise UsageError(f"{what}: not a regular file — {path}", hint)
             content = file.read(MOST_BYTES + 1)

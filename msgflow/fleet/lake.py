@@ -7,6 +7,7 @@ all runs into one file; a run that is replaced afterwards has its own file again
 
 from __future__ import annotations
 
+import fcntl
 import os
 import shlex
 import time
@@ -35,11 +36,6 @@ from msgflow.fleet.layout import (
 from msgflow.fleet.parquet import read_parquet
 from msgflow.sql.failure import first_line
 from msgflow.sql.statement import registered
-
-try:
-    import fcntl
-except ImportError:  # Windows has no such locks
-    fcntl = None  # type: ignore[assignment]
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -176,9 +172,9 @@ class Lake:
             if of is not None:
                 now = {key: self.run(key) or packed.get(key) for key in wanted}
                 wanted = {key for key, row in now.items() if row and row["source"] == of}
-            for key in sorted(wanted - own - packed.keys()):
+            if missing := sorted(wanted - own - packed.keys()):
                 raise UsageError(
-                    f"the lake has no such run — {key}",
+                    f"the lake has no such run — {missing[0]}",
                     f"msgflow fleet runs --lake {shlex.quote(self.store.url)}",
                 )
             kept = [row for key, row in packed.items() if key not in wanted]
@@ -234,7 +230,7 @@ class Lake:
     @contextmanager
     def _locked(self, path: str, *, alone: bool, wait: bool) -> Iterator[None]:
         folder = self.store.full(path)
-        if not fcntl or not self.store.is_local or not os.path.isdir(folder):
+        if not self.store.is_local or not os.path.isdir(folder):
             yield
             return
         descriptor = os.open(folder, os.O_RDONLY)

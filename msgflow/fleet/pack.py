@@ -206,6 +206,8 @@ def _clean_up(lake: Lake, own: set[str], runs: Iterable[Mapping[str, Any]]) -> l
             f"the lake has answers, but no run — {lake.store.url_of(RUN)}",
             "is its file system mounted? If an ingest was killed, start that again",
         )
+    # The file without a row last: without it, the rest would look like a lake that is not mounted.
+    unneeded.sort(key=lambda entry: entry.path == run_path(PACKED))
     for entry in unneeded:
         lake.store.delete(entry.path)
     return unneeded

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.files.yaml_file import Text, YamlFile
-from msgflow.query.names import require_names
+from msgflow.query.names import VISITS, require_names
 from msgflow.text.name_suggestions import did_you_mean
 
 if TYPE_CHECKING:
@@ -66,10 +66,11 @@ class PathsFile:
         self, connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], path: NamedPath
     ) -> None:
         """Raise unless the runs have every topic and node of a path."""
-        for texts in path.places.values():
+        for word, texts in path.places.items():
+            kind = "visit" if word in VISITS else "place"
             for text in texts:
                 try:
-                    require_names(connection, runs, "place", [text.value])
+                    require_names(connection, runs, kind, [text.value])
                 except UsageError as error:
                     self.file.fail(text.line, error.message, error.hint)
 

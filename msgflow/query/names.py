@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 
 # Parameters that take topics or nodes, in every query.
 PLACE_PARAMETERS = ("from", "to", "via", "without")
+# Those that take paths, too.
+VISITS = ("via", "without")
+ARROW = " → "
+# Steps of a path that name no place.
+_NAMELESS = ("?", "not traced")
 _SHOWN = 3
 _TOPICS = """
 SELECT topic_name AS name, is_internal FROM main.publisher WHERE list_contains($runs, run_id)
@@ -81,7 +86,8 @@ def require_places(
             given = [*names_in(connection, runs, "place", given)]
         if isinstance(given, list):
             if not is_known:
-                require_names(connection, runs, "place", [str(each) for each in given])
+                kind = "visit" if key in VISITS else "place"
+                require_names(connection, runs, kind, [str(each) for each in given])
             places[key] = given
     return places
 
@@ -105,11 +111,12 @@ def require_names(
 ) -> None:
     """Raise unless the chosen runs have every name, and something that fits every pattern.
 
-    `kind` is 'topic', 'node', 'callback', 'host', or 'place' for topics, nodes and services.
-    Patterns are globs. Without runs, every name passes; in place of places, so does a path.
+    `kind` is 'topic', 'node', 'callback', 'host', 'place' for topics, nodes and services, or
+    'visit' for a place or a path of places. Patterns are globs. Without runs, every name passes.
     """
-    if kind == "place":
-        names = [name for name in names if " → " not in name]
+    if kind == "visit":
+        names = [place for name in names for place in _places_of(name)]
+        kind = "place"
     if not runs or not names:
         return
     sql, source = _KNOWN[kind]
@@ -140,6 +147,13 @@ def require_names(
     shown = f"the {plural} are {', '.join(known[:_SHOWN])}{rest}" if known else source
     hint = did_you_mean(name, ordinary, did_you_mean(name, known, shown))
     raise UsageError(f"{problem} — {name}", hint)
+
+
+def _places_of(path: str) -> list[str]:
+    if ARROW not in path:
+        return [path]
+    steps = [step.strip().strip("()") for step in path.split(ARROW)]
+    return [step for step in steps if step not in _NAMELESS]
 
 
 def require_ids(

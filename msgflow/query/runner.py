@@ -13,7 +13,7 @@ import duckdb
 from msgflow.errors import UsageError
 from msgflow.query.clock_notes import clock_notes, untraced_notes
 from msgflow.query.doubt_notes import doubt_notes
-from msgflow.query.names import PLACE_PARAMETERS, require_ids, require_names, require_places
+from msgflow.query.names import ARROW, PLACE_PARAMETERS, require_ids, require_names, require_places
 from msgflow.query.selection import (
     COUNTS,
     CUT_COLUMN,
@@ -213,7 +213,12 @@ def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[st
     given: dict[str, Any] = {name: parameters.get(name) or () for name in ("from", "to")}
     given |= {name: getattr(selection, name) for name in (*KINDS, "via", "without")}
     given["where"] = (selection.where,) if selection.where else ()
-    return [f"--{name} {shlex.quote(each)}" for name, texts in given.items() for each in texts]
+    return [
+        # It may come from a number, which is no longer known.
+        "this path" if name == "via" and ARROW in each else f"--{name} {shlex.quote(each)}"
+        for name, texts in given.items()
+        for each in texts
+    ]
 
 
 def _missing_way(

@@ -43,8 +43,8 @@ class Selection:
     slowest: int | None = None  # so many of the slowest rows; all when None
 
     def names(self) -> dict[str, tuple[str, ...]]:
-        """Return the wanted names by kind; a 'place' is a node, topic or service."""
-        given = {kind: getattr(self, kind) for kind in KINDS} | {"place": self.via + self.without}
+        """Return the wanted names by kind; a 'visit' is a place or a path."""
+        given = {kind: getattr(self, kind) for kind in KINDS} | {"visit": self.via + self.without}
         return {kind: names for kind, names in given.items() if names}
 
 

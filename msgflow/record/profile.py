@@ -26,6 +26,7 @@ _TOO_OLD = 12
 # `python3.12`, and no program whose name only begins so: it is executed to learn its version.
 _PYTHON = re.compile(r"(^|/)python[\d.]*$")
 _LONGEST_LINE = 256
+_LONGEST_SECONDS = 10
 _PYTHON_NAMES = (
     f"import sys; sys.exit(0 if hasattr(sys, 'activate_stack_trampoline') else {_TOO_OLD})"
 )
@@ -93,10 +94,16 @@ def with_python_functions(
     """
     python = _python_of(words[0], environment)
     code = 0
-    if python is not None:
-        code = subprocess.run(
-            [python, "-c", _PYTHON_NAMES], env=environment, stderr=subprocess.DEVNULL
-        ).returncode
+    # One that cannot be asked hinders no recording.
+    with suppress(OSError, subprocess.TimeoutExpired):
+        if python is not None:
+            code = subprocess.run(
+                [python, "-c", _PYTHON_NAMES],
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                timeout=_LONGEST_SECONDS,
+            ).returncode
     if code:
         why = "is older than 3.12" if code == _TOO_OLD else f"does not run (exit code {code})"
         note(

@@ -24,7 +24,7 @@ _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 # 1970. As seconds, this number would be 30 million years.
 LEAST_EPOCH_NS = 10**15
 _OFFSET = re.compile(
-    r"(?P<sign>\+?)(?P<number>\d{1,40}(?:\.\d{1,40})?)(?P<unit>ns|us|µs|ms|s|min|h)?"
+    r"(?P<sign>\+?)(?P<number>\d{1,40}(?:\.\d{1,40})?)(?P<unit>ns|us|µs|ms|s|min|h|d)?"
 )
 _UNIT_NS = {
     "ns": 1,
@@ -34,6 +34,7 @@ _UNIT_NS = {
     "s": 1_000_000_000,
     "min": 60_000_000_000,
     "h": 3_600_000_000_000,
+    "d": 86_400_000_000_000,
 }
 _FRACTION = re.compile(r"(?P<head>.*:\d\d)\.(?P<fraction>\d{1,9})(?P<tail>.*)")
 

@@ -319,8 +319,10 @@ def read(path: Path) -> Header:
 
 def name_of(path: Path) -> str:
     """Return the name that the object of a file has by its place."""
-    below = str(path.parent.as_posix()).rpartition("schema/")[2]
-    schema = SCHEMAS.get(below.partition("/")[0])
+    root = resource_directory("schema")
+    if not path.is_relative_to(root):
+        return path.stem
+    schema = SCHEMAS.get(path.relative_to(root).parts[0])
     return path.stem if schema is None else f"{schema}.{path.stem}"
 
 

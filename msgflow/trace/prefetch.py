@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections import deque
-from concurrent.futures import ThreadPoolExecutor
+import sys
+from queue import SimpleQueue
+from threading import Semaphore, Thread
 from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
@@ -18,12 +19,34 @@ def prefetched(items: Generator[Item, None, None], most: int) -> Generator[Item,
     An error is raised where its item would have been. Once this generator is closed, or ends,
     `items` is closed and the thread has ended.
     """
-    with ThreadPoolExecutor(1, thread_name_prefix="msgflow-reader") as thread:
-        futures = deque(thread.submit(next, items, None) for _ in range(most + 1))
-        try:
-            while (item := futures.popleft().result()) is not None:
-                futures.append(thread.submit(next, items, None))
-                yield item
-        finally:
-            thread.shutdown(cancel_futures=True)
+    made = SimpleQueue[Item | BaseException | None]()
+    places = Semaphore(most + 1)
+    is_wanted = True
+
+    def make() -> None:
+        item: Item | BaseException | None = None
+        while places.acquire() and is_wanted:
+            try:
+                item = next(items, None)
+            except BaseException as error:
+                item = error
+            made.put(item)
+            if item is None or isinstance(item, BaseException):
+                return
+
+    # No pool of threads: it takes no work once the main thread has ended, though others go on.
+    thread = Thread(target=make, name="msgflow-reader", daemon=True)
+    thread.start()
+    try:
+        while (item := made.get()) is not None:
+            if isinstance(item, BaseException):
+                raise item
+            places.release()
+            yield item
+    finally:
+        is_wanted = False
+        places.release()
+        # When the interpreter ends, the thread stands still, perhaps within `items`.
+        if not sys.is_finalizing():
+            thread.join()
             items.close()

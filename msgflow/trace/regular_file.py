@@ -43,12 +43,12 @@ def read_regular(path: Path, most_bytes: int | None, size: int = -1) -> bytes:
 def open_regular(path: Path) -> BufferedReader:
     """Open a regular file for reading."""
     # A blocking `open` of a pipe without a writer would wait for ever.
-    file = os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb")
-    mode = os.fstat(file.fileno()).st_mode
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    mode = os.fstat(descriptor).st_mode
     if not stat.S_ISREG(mode):
-        file.close()
+        os.close(descriptor)
         raise UnsuitableFileError(errno.EINVAL, f"{_kind(mode)}, no file", str(path))
-    return file
+    return os.fdopen(descriptor, "rb")
 
 
 def irregular(path: Path) -> str | None:

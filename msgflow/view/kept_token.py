@@ -12,7 +12,7 @@ from pathlib import Path
 
 _BYTES = 24
 # Neither a link nor a pipe is followed or waited for.
-_FLAGS = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+_FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK
 _OF_OTHERS = stat.S_IRWXG | stat.S_IRWXO
 _TOKEN = re.compile(rb"[\w-]{32}")
 
@@ -34,7 +34,7 @@ def _new() -> str:
 
 
 def _file(place: str) -> Path:
-    given = os.environ.get("LOCALAPPDATA" if os.name == "nt" else "XDG_STATE_HOME")
+    given = os.environ.get("XDG_STATE_HOME")
     root = Path(given) if given and os.path.isabs(given) else Path("~/.local/state").expanduser()
     return root / "msgflow" / f"token-{hashlib.sha256(os.fsencode(place)).hexdigest()}"
 
@@ -46,8 +46,10 @@ def _read(path: Path) -> str | None:
         return None
     with open(descriptor, "rb") as file:
         status = os.fstat(descriptor)
-        is_ours = stat.S_ISREG(status.st_mode) and (
-            os.name == "nt" or (status.st_uid == os.geteuid() and not status.st_mode & _OF_OTHERS)
+        is_ours = (
+            stat.S_ISREG(status.st_mode)
+            and status.st_uid == os.geteuid()
+            and not status.st_mode & _OF_OTHERS
         )
         found = _TOKEN.fullmatch(file.read(_BYTES * 2)) if is_ours else None
     return None if found is None else found[0].decode()

@@ -11,6 +11,7 @@ from thorough import thorough
 
 from msgflow.db import derivation, objects
 from msgflow.db.sandbox import open_file
+from msgflow.files.resources import resource_directory
 from msgflow.ingest import ingest
 from msgflow.sql.header import parse
 from msgflow_sim import Recording, simulate
@@ -18,7 +19,7 @@ from msgflow_sim import Recording, simulate
 
 def header(name: str, *needs: str) -> objects.Header:
     text = f"-- description: A rule.\nFROM {', '.join(needs)}\n"
-    return parse(text, Path(f"schema/link/{name.partition('.')[2]}.sql"))
+    return parse(text, resource_directory("schema") / "link" / f"{name.partition('.')[2]}.sql")
 
 
 def test_what_a_table_holds_comes_from_the_object_of_its_name() -> None:

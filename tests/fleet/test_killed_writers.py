@@ -107,6 +107,18 @@ def test_a_pack_that_is_killed_changes_no_answer(
     assert len(paths(lake, VIEWS)) == len(lake.store.folders(VIEWS))
 
 
+def test_a_pack_that_is_killed_after_the_last_run_was_removed_can_be_repeated(
+    holding: tuple[Lake, Row, Row],
+) -> None:
+    lake, *rows = holding
+    lake.remove([row["run"] for row in rows])
+    before = paths(lake, "")
+    dies(_PACKS, lake, 1)
+    assert len(before - paths(lake, "")) == 1
+    assert pack(lake).deleted
+    assert paths(lake, *ANSWERS, "run") == set()
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("steps", [pytest.param(5, marks=pytest.mark.thorough), _TABLES])
 def test_a_replacement_that_is_killed_leaves_the_old_run(

@@ -78,6 +78,8 @@ def test_paths_by_topics_and_nodes(database: Database) -> None:
         path for path in every if PLANNER in path and "/camera/" in path
     ]
     assert paths(without="/planning/*") == [path for path in every if "/planning/" not in path]
+    assert paths(via=every[1]) == [every[1]]
+    assert paths(without=every[1]) == [every[0], *every[2:]]
     assert paths(from_="/lidar/*") == [path for path in every if path.startswith("/lidar/")]
     assert paths(from_="/camera/driver,/imu/driver") == [
         path for path in every if path.startswith(("/camera/driver", "/imu/driver"))
@@ -87,6 +89,29 @@ def test_paths_by_topics_and_nodes(database: Database) -> None:
     middle = rows(database, "e2e-latency", from_="/perception/tracker", to="/base/*")
     assert [row["path"].partition(" → ")[0] for row in middle] == ["/perception/tracker"]
     assert middle[0]["reached"] > 0
+
+
+@pytest.mark.parametrize("query", ["e2e-latency", "critical-path"])
+@pytest.mark.parametrize("word", ["via", "without", "from", "to"])
+def test_a_path_has_places_of_the_run(database: Database, query: str, word: str) -> None:
+    """It stands in place of places that are visited, not of those where flows start or end."""
+    (path, *_) = [row["path"] for row in rows(database, "e2e-latency")]
+    start = path.partition(" → ")[0]
+    with pytest.raises(UsageError, match=r"there is no such topic or node .*/typo"):
+        database.query(query, **{word: [f"{start} → /typo"]})
+    # What has no name is no place, and a service stands in brackets.
+    known = [f"(not traced) → (?) → ? → ({start}) → {start}"]
+    if word in ("via", "without"):
+        database.query(query, **{word: known})
+    else:
+        with pytest.raises(UsageError, match="no topic or node in the run fits"):
+            database.query(query, **{word: known})
+
+
+def test_a_path_that_leaves_no_rows_is_not_written_out(database: Database) -> None:
+    (path, *_) = [row["path"] for row in rows(database, "e2e-latency")]
+    nothing = database.query("e2e-latency", via=[path], where="roots < 0")
+    assert nothing.notes[-1] == "nothing fits this path --where 'roots < 0': try with less"
 
 
 def test_topics_are_as_they_were_before_there_were_nodes(database: Database) -> None:
@@ -234,7 +259,7 @@ def test_words_of_a_selection() -> None:
     assert values_of(None) == ()
     assert values_of("/a, /b,") == ("/a", "/b")
     assert values_of(["/a,/b", "/c"]) == ("/a,/b", "/c")
-    assert make_selection({"via": "/a", "without": ["/b"]}).names() == {"place": ("/a", "/b")}
+    assert make_selection({"via": "/a", "without": ["/b"]}).names() == {"visit": ("/a", "/b")}
 
 
 def latencies(database: Database, **given: Any) -> list[int]:

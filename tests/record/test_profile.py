@@ -154,6 +154,9 @@ def test_python_is_asked_to_name_its_functions(tmp_path: Path) -> None:
     assert not said(program("python_robot", f"#!/bin/sh\ntouch {tmp_path}/executed\nexit 12\n"))
     assert not said("absent")
     assert not (tmp_path / "executed").exists()
+    # One that the system cannot execute ends no recording.
+    program("python3.14", "no program")
+    assert not said("python3.14", "robot.py")
 
 
 @pytest.mark.thorough

@@ -28,6 +28,7 @@ RUNS = (FIRST, Run(2, "noon", START), Run(3, "evening", START))
         ("250us", START + 250_000),
         ("7ns", START + 7),
         ("2min", START + 120_000_000_000),
+        ("1d", START + 86_400_000_000_000),
         ("0.000000001s", START + 1),
         (str(START + 5), START + 5),
         (START + 5, START + 5),

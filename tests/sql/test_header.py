@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Column, Header, HeaderError, Param, parse
 
 PATH = Path("queries/example.sql")
@@ -93,7 +94,12 @@ def test_an_object_needs_what_its_statements_name() -> None:
 
 def test_an_object_does_not_need_itself() -> None:
     text = "-- description: x\nCREATE MACRO main.a() AS TABLE FROM main.b\n"
-    assert parse(text, Path("schema/public/a.sql")).needs == ("main.b",)
+    assert parse(text, resource_directory("schema") / "public" / "a.sql").needs == ("main.b",)
+
+
+def test_folders_above_the_checkout_give_no_name() -> None:
+    path = Path("/schema/model/msgflow/queries/topics.sql")
+    assert parse("-- description: x\nSELECT 1\n", path).name == "topics"
 
 
 @pytest.mark.parametrize(("limits", "maximum"), [("1..", None), ("1..64", 64)])

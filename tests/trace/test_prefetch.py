@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Generator, Iterator
@@ -15,6 +17,29 @@ from reading_threads import reading_threads
 import msgflow.trace
 from msgflow.trace.ctf import batches, event_order
 from msgflow.trace.prefetch import prefetched
+
+_OTHER_THREAD = """
+import threading
+from msgflow.trace.prefetch import prefetched
+
+def read():
+    threading.main_thread().join()
+    print(list(prefetched((number for number in range(3)), 1)))
+
+threading.Thread(target=read).start()
+"""
+# The item that the thread makes when the program ends is never made.
+_ABANDONED = """
+import threading
+from msgflow.trace.prefetch import prefetched
+
+def make():
+    yield 0
+    threading.Event().wait()
+
+items = prefetched(make(), 1)
+print(next(items))
+"""
 
 
 def test_all_items_in_order() -> None:
@@ -66,6 +91,23 @@ def test_closing_ends_the_iterator() -> None:
     items.close()
     assert closed.is_set()
     assert reading_threads() == 0
+
+
+def outlived(program: str) -> str:
+    """Run a program whose main thread ends first; return what it prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stderr == ""
+    return done.stdout
+
+
+def test_other_threads_read_when_the_main_thread_has_ended() -> None:
+    assert outlived(_OTHER_THREAD) == "[0, 1, 2]\n"
+
+
+def test_an_abandoned_iteration_does_not_keep_the_program() -> None:
+    assert outlived(_ABANDONED) == "0\n"
 
 
 class TestReading:
