@@ -78,7 +78,7 @@ LOWEST_RECALL |= {"shared_publisher": 0.9998}
 # Several threads, or one in a burst, write to one topic within microseconds. If the publication of
 # one message is lost, and the take of another, nothing in the trace tells. So a wrong link must at
 # least be marked.
-MOST_LOSS_AFFECTED = {"rivals": 0.001, "bursts": 0.001}
+MOST_LOSS_AFFECTED = dict.fromkeys(("rivals", "bursts", "bursts_two_hosts"), 0.001)
 # Recorded with losses: their truth says which events are missing, but not where others might be. A
 # link over such a place is not decided, and a publication may be torn in two. Precision is judged.
 LOSSY_RECORDINGS = {"intra_lost", "lossy_intra", "lossy_intra_mt"}
