@@ -11,6 +11,8 @@ import pytest
 from msgflow.db import objects
 from msgflow.db.store_table import store_tables, table_views
 from msgflow.db.tables import STORE
+from msgflow.files.resources import resource_directory
+from msgflow.sql.header import parse
 
 VIEWS = table_views()
 AHEAD_NS = 1_000
@@ -131,9 +133,8 @@ def test_a_header_may_name_columns_of_its_table() -> None:
     assert by_name["latency_ns"].unit == "ns"
 
 
-def test_a_header_names_no_column_that_the_table_lacks(tmp_path: Path) -> None:
-    path = tmp_path / "schema" / "public" / "take.sql"
-    path.parent.mkdir(parents=True)
-    path.write_text("-- description: Takes.\n-- column: taken_us\nSELECT 1\n")
+def test_a_header_names_no_column_that_the_table_lacks() -> None:
+    text = "-- description: Takes.\n-- column: taken_us\nSELECT 1\n"
+    header = parse(text, resource_directory("schema") / "public" / "take.sql")
     with pytest.raises(ValueError, match="store has no column 'taken_us'"):
-        objects.completed(objects.read(path))
+        objects.completed(header)
