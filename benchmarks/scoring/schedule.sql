@@ -79,7 +79,7 @@ SELECT
         ' ', s.running_ns, s.preempted_ns, s.runnable_ns, s.sleeping_ns, s.uninterruptible_ns,
         s.unknown_ns, s.irq_ns, s.softirq_ns, s.preemption_count
     ),
-    -- A callback of which the trace lost an event says so itself.
+    -- A callback has a mark of its own where the trace lost one of its events.
     s.is_loss_affected OR i.is_loss_affected OR EXISTS (
         FROM unmarked_loss AS l
         WHERE l.host = p.host AND l.end_ns >= i.start_ns AND l.start_ns <= i.end_ns

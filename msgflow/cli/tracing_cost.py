@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from msgflow.text.values import format_duration
+from msgflow.text.values import ARROW, format_duration
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
 
-_ARROW = " → "
 # What a message makes from one callback to the next: ten in the layers of ROS, two of the executor.
 _EVENTS_OF_HOP = 12
 _MOST_PATHS = 3
@@ -52,11 +51,11 @@ def part_of_latencies(database: Database, latencies: QueryResult) -> Iterator[st
     parts = []
     for row in sorted(rows, key=lambda row: -row["median_ns"])[:_MOST_PATHS]:
         *_, measured = _traced(database, row["run_id"])
-        hops = row["path"].count(_ARROW) // 2
+        hops = row["path"].count(ARROW) // 2
         tracing = format_duration(
             hops * _EVENTS_OF_HOP * (USUAL_NS if measured is None else measured)
         )
-        topic = row["path"].split(_ARROW)[-2]
+        topic = row["path"].split(ARROW)[-2]
         parts.append(f"{tracing} of {topic}'s {format_duration(row['median_ns'])}")
     if parts:
         yield f"of the latencies, tracing is about {', '.join(parts)}"

@@ -7,8 +7,8 @@ from collections import Counter, defaultdict
 from typing import TYPE_CHECKING, Any
 
 from msgflow.files.yaml_file import list_lines, quoted
-from msgflow.text.values import format_duration, printable
-from msgflow.text.wrapping import ARROW, wrap_path
+from msgflow.text.values import ARROW, format_duration, printable
+from msgflow.text.wrapping import wrap_path
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from msgflow.errors import UsageError
 from msgflow.query.selection import values_of
 from msgflow.text.name_suggestions import did_you_mean
+from msgflow.text.values import ARROW
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 PLACE_PARAMETERS = ("from", "to", "via", "without")
 # Those that take paths, too.
 VISITS = ("via", "without")
-ARROW = " → "
 # Steps of a path that name no place.
 _NAMELESS = ("?", "not traced")
 _SHOWN = 3

@@ -13,7 +13,7 @@ import duckdb
 from msgflow.errors import UsageError
 from msgflow.query.clock_notes import clock_notes, untraced_notes
 from msgflow.query.doubt_notes import doubt_notes
-from msgflow.query.names import ARROW, PLACE_PARAMETERS, require_ids, require_names, require_places
+from msgflow.query.names import PLACE_PARAMETERS, require_ids, require_names, require_places
 from msgflow.query.selection import (
     COUNTS,
     CUT_COLUMN,
@@ -31,7 +31,7 @@ from msgflow.sql.failure import first_line, query_errors
 from msgflow.sql.statement import RECORDED, internal_sql, may_have_rows, recorded
 from msgflow.sql.value import described_type, parse_text
 from msgflow.text.name_suggestions import did_you_mean
-from msgflow.text.values import format_duration
+from msgflow.text.values import ARROW, format_duration
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

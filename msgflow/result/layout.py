@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 from rich.cells import cell_len
 
 from msgflow.result.cells import is_number
-from msgflow.text.values import MOMENT, NULL, column_title, format_cell, short_symbol
-from msgflow.text.wrapping import ARROW, longest_piece, longest_word, wrap
+from msgflow.text.values import ARROW, MOMENT, NULL, column_title, format_cell, short_symbol
+from msgflow.text.wrapping import longest_piece, longest_word, wrap
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

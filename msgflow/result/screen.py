@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from rich.cells import cell_len
 
 from msgflow.result.layout import GAP
-from msgflow.text.wrapping import ARROW, wrap, wrap_path
+from msgflow.text.values import ARROW
+from msgflow.text.wrapping import wrap, wrap_path
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

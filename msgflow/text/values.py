@@ -11,6 +11,9 @@ from typing import Any
 from msgflow.run.window import format_epoch
 from msgflow.text.json_value import json_value
 
+ARROW = " → "
+"""Between the steps of a path."""
+
 # `module:function`, as the tracer of Python nodes has it.
 _PYTHON = re.compile(r"[^\s:(<]+:[^:]")
 _BOUND = re.compile(r"std::_Bind<[^(]*\((?P<owner>[\w:]+)::\*")

@@ -6,7 +6,8 @@ import re
 
 from rich.cells import cell_len, set_cell_size
 
-ARROW = " → "
+from msgflow.text.values import ARROW
+
 # Where a text may be broken: at a space, but not between a number and its unit.
 _SPACE = re.compile(r"(?<!\d) | (?!(?:ns|µs|ms|s|Hz|%|ppb)(?!\w))")
 # Where a name may be broken: behind a parenthesis, before a slash.

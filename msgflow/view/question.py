@@ -1,4 +1,4 @@
-"""Question of a page: of which run and times it is, and its parameters, read and checked."""
+"""A question of a page: its run, its window of time, and its parameters, read and checked."""
 
 from __future__ import annotations
 

@@ -176,7 +176,7 @@ class TypeReader:
         self._aliases[str(fragment.get("name"))] = self._type(fragment.get("field-class"))
 
     def structure(self, fragment: dict[str, Any], key: str) -> ctf.Structure:
-        """Return the structure under `key`, an empty one if there is none."""
+        """Return the structure under `key`; an empty one where the metadata have no such key."""
         if key not in fragment:
             return ctf.Structure()
         declared = self._type(fragment[key])

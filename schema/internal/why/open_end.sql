@@ -1,9 +1,9 @@
 -- title: Timers that may use what their node was told before
--- description: Links that may be missing (main.dead_end), from messages that a node keeps to timers
---     of it; in a loop, too: what moves a robot is told where it is. Of several timers the fastest
---     uses them: others tell how the node is. So does a timer whose messages nobody gets, or that
---     publishes where other nodes do, too (/diagnostics). What runs for less than a tenth of the
---     time that the callback of a message takes is not what uses it.
+-- description: Links that may be missing (main.dead_end), from messages that a node keeps to its
+--     timers. A closed loop counts, too: a controller hears where the robot is. Of several timers
+--     only the fastest counts; the others report on the node. A timer also reports on the node if
+--     nobody gets its messages, or if other nodes publish on its topic (/diagnostics). A timer that
+--     runs for less than a tenth of the time that the callback of a message takes does not use it.
 -- grain: as main.dead_end
 -- when: main.timer WHERE node_id IN (SELECT node_id FROM main.subscription WHERE NOT is_internal)
 -- column: node_id BIGINT  As in main.dead_end

@@ -38,7 +38,8 @@ traced AS (
 ),
 callback AS MATERIALIZED (
     SELECT
-        -- Of no path more than all: callbacks also run for what is not on it.
+        -- Nothing takes more than its path has: callbacks also run for what is not on it. What is
+        -- not known stays so; least() would forget that.
         m.* REPLACE (
             m.cpu_ns - greatest(m.cpu_ns - p.path_ns, 0) AS cpu_ns,
             least(m.call_ns, p.path_ns) AS call_ns,
