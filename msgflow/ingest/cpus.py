@@ -3,8 +3,8 @@
 Only a reader has all events in hand in their total order: to find out in SQL what ran on a CPU
 would sort the largest tables there are. Interrupts are not staged one event by the other, as there
 are many of them: a waking says in which one it came, and those that interrupted a thread are rows
-of `INTERRUPT_SCHEMA`. Nor are the contexts of switches, which say what ids the thread that leaves a
-CPU has in its PID namespace: they are rows of `KERNEL_THREAD_SCHEMA`, one per round.
+of `raw.interrupt`. Nor are the contexts of switches, which say what ids the thread that leaves a
+CPU has in its PID namespace: they are rows of `raw.kernel_thread`, one per round.
 """
 
 from __future__ import annotations
@@ -25,35 +25,10 @@ if TYPE_CHECKING:
 
     from msgflow.ingest.catalogue import Catalogue, Tracepoint
 
+# Tables of `raw`: interrupts that were handled while a thread had the CPU, and ids of threads to
+# the kernel and in their PID namespace, with the first and last time in a round.
 INTERRUPT = "interrupt"
-"""Table of `raw` with the rows of `INTERRUPT_SCHEMA`."""
-
-INTERRUPT_SCHEMA = pa.schema(
-    [
-        pa.field("trace_index", pa.int32(), nullable=False),
-        pa.field("kind", pa.dictionary(pa.int32(), pa.string())),
-        pa.field("start_ns", pa.int64(), nullable=False),
-        pa.field("end_ns", pa.int64(), nullable=False),
-        pa.field("tid", pa.int32(), nullable=False),
-    ]
-)
-"""Interrupts that were handled while a thread had the CPU: begin, end, and the thread."""
-
 KERNEL_THREAD = "kernel_thread"
-"""Table of `raw` with the rows of `KERNEL_THREAD_SCHEMA`."""
-
-KERNEL_THREAD_SCHEMA = pa.schema(
-    [
-        pa.field("trace_index", pa.int32()),
-        pa.field("tid", pa.int32()),
-        pa.field("vpid", pa.int32()),
-        pa.field("vtid", pa.int32()),
-        pa.field("pid_ns", pa.int64()),
-        pa.field("first_ns", pa.int64()),
-        pa.field("last_ns", pa.int64()),
-    ]
-)
-"""Ids of threads to the kernel and in their PID namespace: first and last time in a round."""
 
 _SWITCH = ("event_id", "ts_ns", "tid", "number")
 _HANDLING = ("event_id", "ts_ns", "is_open")
@@ -159,15 +134,14 @@ class Cpus:
         is_whole: NDArray[np.bool_],
     ) -> pa.RecordBatch:
         chosen = np.flatnonzero(is_whole)
-        return pa.RecordBatch.from_arrays(
-            [
-                to_arrow(to_numpy(batch["trace_index"])[chosen]),
-                self._named(np.full(chosen.size, kind, np.int32)),
-                to_arrow(start_ns[chosen]),
-                to_arrow(to_numpy(batch["ts_ns"])[chosen]),
-                to_arrow(tids[chosen].astype(np.int32)),
-            ],
-            schema=INTERRUPT_SCHEMA,
+        return pa.RecordBatch.from_pydict(
+            {
+                "trace_index": to_arrow(to_numpy(batch["trace_index"])[chosen]),
+                "kind": self._named(np.full(chosen.size, kind, np.int32)),
+                "start_ns": to_arrow(start_ns[chosen]),
+                "end_ns": to_arrow(to_numpy(batch["ts_ns"])[chosen]),
+                "tid": to_arrow(tids[chosen].astype(np.int32)),
+            }
         )
 
 
@@ -179,10 +153,7 @@ def _kernel_threads(switches: pa.RecordBatch) -> list[tuple[str, pa.RecordBatch]
     ids = ["trace_index", "prev_tid", "vpid", "vtid", "pid_ns"]
     known = pa.Table.from_batches([switches.select([*ids, "ts_ns"])]).filter(pa.array(is_known))
     found = known.group_by(ids, use_threads=False).aggregate([("ts_ns", "min"), ("ts_ns", "max")])
-    named = found.select([*ids, "ts_ns_min", "ts_ns_max"]).rename_columns(
-        KERNEL_THREAD_SCHEMA.names
-    )
-    rows = named.cast(KERNEL_THREAD_SCHEMA).combine_chunks()
+    rows = found.select([*ids, "ts_ns_min", "ts_ns_max"]).combine_chunks()
     return [(KERNEL_THREAD, batch) for batch in rows.to_batches()]
 
 

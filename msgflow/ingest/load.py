@@ -14,7 +14,7 @@ from msgflow.db.transaction import transaction
 from msgflow.ingest import overlapping_traces, staging
 from msgflow.ingest.catalogue import USER_EVENT, load
 from msgflow.ingest.cpus import Cpus
-from msgflow.ingest.sequences import Placed, Sequences
+from msgflow.ingest.sequences import Sequences
 from msgflow.ingest.staging import RawTables
 from msgflow.ingest.user_events import is_match, matches, names_of, user_rows
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
@@ -83,9 +83,10 @@ def load_traces(
             # A thread reads the next round while DuckDB inserts this one.
             placed = _placed(batches, sequences, cpus, corrections, implausible, beside)
             with contextlib.closing(prefetched(placed, 1)) as ahead:
-                for item in ahead:
+                for of_round in ahead:
                     interrupts.check()
-                    tables.add_all(item)
+                    for table, rows in of_round:
+                        tables.add(table, rows)
             tables.flush()
         return implausible
 
@@ -139,37 +140,33 @@ def _placed(
     corrections: Corrections | None,
     implausible: ImplausibleValues,
     beside: duckdb.DuckDBPyConnection,
-) -> Generator[Placed | tuple[str, pa.RecordBatch], None, None]:
-    """Yield the events of all batches, round by round, and (table, rows) of packets and kernel.
+) -> Generator[list[tuple[str, pa.RecordBatch]], None, None]:
+    """Yield (table, rows) of all batches, round by round.
 
     Nothing else uses the connection `beside` meanwhile.
     """
     tracepoints = load().in_traces
     for _, of_round in itertools.groupby(batches, key=lambda batch: batch.round):
-        events = []
-        of_cpus = []
+        placed, events, of_cpus = [], [], []
         for batch in of_round:
-            if batch.name == PACKET:
-                yield PACKET, batch.batch
-                continue
             tracepoint = tracepoints.get(batch.name, USER_EVENT)
-            if tracepoint.role is not None:
+            if batch.name == PACKET:
+                placed.append((PACKET, batch.batch))
+            elif tracepoint.role is not None:
                 of_cpus.append((tracepoint, batch.batch))
-                continue
-            if tracepoint.is_kernel:
-                yield without_thread(tracepoint, batch.batch)
-                continue
-            if tracepoint is USER_EVENT:
-                rows = user_rows(beside, batch.name, batch.batch)
+            elif tracepoint.is_kernel:
+                placed.append(without_thread(tracepoint, batch.batch))
             else:
-                rows = implausible.without(batch.name, batch.batch)
-            rows = rows if corrections is None else corrections.applied(rows)
-            if rows.num_rows:
-                events.append((tracepoint.name, rows))
-        if of_cpus:
-            yield from cpus.place(of_cpus)
-        if events:
-            yield sequences.place(events)
+                if tracepoint is USER_EVENT:
+                    rows = user_rows(beside, batch.name, batch.batch)
+                else:
+                    rows = implausible.without(batch.name, batch.batch)
+                rows = rows if corrections is None else corrections.applied(rows)
+                if rows.num_rows:
+                    events.append((tracepoint, rows))
+        placed += cpus.place(of_cpus) if of_cpus else []
+        placed += sequences.place(events) if events else []
+        yield placed
 
 
 def superfluous(traces: Sequence[TraceInfo]) -> frozenset[str]:

@@ -7,7 +7,6 @@ looking for predecessors later would sort the largest tables there are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,62 +15,22 @@ import pyarrow as pa
 from msgflow.ingest.catalogue import Origin
 from msgflow.ingest.groups import NONE, Groups, Latest, Numbers, gathered, present
 from msgflow.trace.columns import COMMON_SCHEMA
-from msgflow.trace.numpy_arrow import empty_batch, is_valid, texts_to_arrow, to_arrow, to_numpy
+from msgflow.trace.numpy_arrow import is_valid, texts_to_arrow, to_arrow, to_numpy
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from msgflow.ingest.catalogue import Catalogue
+    from msgflow.ingest.catalogue import Catalogue, Tracepoint
 
-THREAD_SCHEMA = pa.schema(
-    [
-        pa.field("thread_index", pa.int32(), nullable=False),
-        pa.field("trace_index", pa.int32(), nullable=False),
-        pa.field("pid_ns", pa.int64()),
-        pa.field("vpid", pa.int32(), nullable=False),
-        pa.field("vtid", pa.int32(), nullable=False),
-    ]
-)
-"""Threads as their events name them; `trace_index` is a trace of their host."""
-
-THREAD_NAME_SCHEMA = pa.schema(
-    [
-        pa.field("thread_index", pa.int32(), nullable=False),
-        pa.field("procname", pa.dictionary(pa.int32(), pa.string())),
-        pa.field("first_event_id", pa.int64(), nullable=False),
-        pa.field("last_event_id", pa.int64(), nullable=False),
-        pa.field("first_seen_ns", pa.int64(), nullable=False),
-        pa.field("last_seen_ns", pa.int64(), nullable=False),
-    ]
-)
-"""Stretches of events of a thread under one name; several may follow each other."""
-
-CPU_RETURN_SCHEMA = pa.schema(
-    [
-        pa.field("thread_index", pa.int32(), nullable=False),
-        pa.field("event_id", pa.int64(), nullable=False),
-    ]
-)
-"""Events of a thread that changed its CPU twice faster than a thread can."""
+    Rows = tuple[str, pa.RecordBatch]  # of a table of `raw`
 
 _LEADING = ("event_id", "ts_ns", "trace_index", "cpu_id")
 _CONTEXTS = len(COMMON_SCHEMA)
 # A thread that is made to change and to change back at once takes 22 us, and others do not come
 # below 100 us, where that was measured.
 _SHORTEST_RETURN_NS = 10_000
-
-
-@dataclass(frozen=True)
-class Placed:
-    """Events of a round with their threads and predecessors."""
-
-    # (event name, batch), with the columns of the staging tables.
-    batches: tuple[tuple[str, pa.RecordBatch], ...]
-    threads: pa.RecordBatch  # rows of `THREAD_SCHEMA` that were not there before
-    thread_names: pa.RecordBatch  # rows of `THREAD_NAME_SCHEMA`
-    cpu_returns: pa.RecordBatch  # rows of `CPU_RETURN_SCHEMA`
 
 
 class Sequences:
@@ -82,13 +41,8 @@ class Sequences:
 
         `hosts` has a number for each trace index, which traces of the same host share.
         """
-        self._tracepoints = catalogue.staged
-        self._labels = catalogue.labels
+        self._labels = {label: number for number, label in enumerate(catalogue.labels)}
         self._label_texts = texts_to_arrow(catalogue.labels)
-        self._label_of = {
-            name: NONE if t.label is None else self._labels.index(t.label)
-            for name, t in catalogue.staged.items()
-        }
         self._bits = {name: 1 << bit for bit, name in enumerate(catalogue.sequences)}
         self._threads = _Threads(hosts)
         asked = {
@@ -101,11 +55,11 @@ class Sequences:
             for name in catalogue.sequences
         }
 
-    def place(self, batches: Sequence[tuple[str, pa.RecordBatch]]) -> Placed:
-        """Give the events of one round their threads and predecessors.
+    def place(self, batches: Sequence[tuple[Tracepoint, pa.RecordBatch]]) -> list[Rows]:
+        """Return (table, rows) of the events of one round, with their threads and predecessors.
 
-        `batches` has all wanted events of the round, in the order of the reader, each batch with
-        its name in `Catalogue.staged`.
+        `batches` has all wanted events of the round, in the order of the reader. What is new of
+        threads comes with them.
         """
         sizes = [batch.num_rows for _, batch in batches]
         ends = np.cumsum([0, *sizes])
@@ -113,61 +67,37 @@ class Sequences:
         ids = gathered(batches, "event_id")
         threads = self._threads.of(batches)
         groups = Groups(ids, threads)
-        of_names = [sum(self._bits[s] for s in self._tracepoints[n].sequences) for n, _ in batches]
-        members = np.repeat(np.array(of_names, np.uint8), sizes)[groups.rows]
+        of_batches = [sum(self._bits[name] for name in each.sequences) for each, _ in batches]
+        members = np.repeat(np.array(of_batches, np.uint8), sizes)[groups.rows]
+        labels = [self._labels.get(each.label or "", NONE) for each, _ in batches]
         events = {
             Origin.EVENT_ID: ids[groups.rows],
             Origin.TS_NS: gathered(batches, "ts_ns")[groups.rows],
-            Origin.LABEL: np.repeat(
-                np.array([self._label_of[name] for name, _ in batches], np.int8), sizes
-            )[groups.rows],
+            Origin.LABEL: np.repeat(np.array(labels, np.int8), sizes)[groups.rows],
         }
         origins = {}
         for sequence, latest in self._latest.items():
             latest.grow(self._threads.count)
             origins[sequence] = latest.before(groups, members & self._bits[sequence], events)
-        placed = tuple(
-            (
-                name,
-                self._extended(
-                    name,
-                    batch,
-                    threads[begin:end],
-                    [
-                        origins[each.sequence][each.origin][groups.place[begin:end]]
-                        for each in self._tracepoints[name].predecessors
-                    ],
-                ),
-            )
-            for (name, batch), begin, end in zip(batches, ends[:-1], ends[1:], strict=True)
-        )
-        return Placed(
-            placed,
-            _new_threads(batches, threads, known),
+        placed: list[Rows] = []
+        for (tracepoint, batch), begin, end in zip(batches, ends[:-1], ends[1:], strict=True):
+            columns = {column: batch[column] for column in _LEADING}
+            columns["thread_index"] = to_arrow(threads[begin:end])
+            for before in tracepoint.predecessors:
+                values = origins[before.sequence][before.origin][groups.place[begin:end]]
+                column = to_arrow(values, values == NONE)
+                if before.origin is Origin.LABEL:
+                    column = pa.DictionaryArray.from_arrays(column, self._label_texts)
+                columns[before.column] = column
+            for field in batch.schema.names[_CONTEXTS:]:
+                columns[field] = batch[field]
+            placed.append((tracepoint.table, pa.RecordBatch.from_pydict(columns)))
+        return [
+            *placed,
+            *_new_threads(batches, threads, known),
             _names(batches, groups, events),
-            _cpu_returns(batches, groups, events),
-        )
-
-    def _extended(
-        self,
-        name: str,
-        batch: pa.RecordBatch,
-        threads: NDArray[np.int32],
-        predecessors: Sequence[NDArray[Any]],
-    ) -> pa.RecordBatch:
-        columns = {column: batch[column] for column in _LEADING}
-        columns["thread_index"] = to_arrow(threads)
-        for predecessor, values in zip(
-            self._tracepoints[name].predecessors, predecessors, strict=True
-        ):
-            is_missing = values == NONE
-            column = to_arrow(values, is_missing)
-            if predecessor.origin is Origin.LABEL:
-                column = pa.DictionaryArray.from_arrays(column, self._label_texts)
-            columns[predecessor.column] = column
-        for field in batch.schema.names[_CONTEXTS:]:
-            columns[field] = batch[field]
-        return pa.RecordBatch.from_pydict(columns)
+            *_cpu_returns(batches, groups, events),
+        ]
 
 
 class _Threads:
@@ -181,7 +111,7 @@ class _Threads:
     def count(self) -> int:
         return self._threads.count
 
-    def of(self, batches: Sequence[tuple[str, pa.RecordBatch]]) -> NDArray[np.int32]:
+    def of(self, batches: Sequence[tuple[Tracepoint, pa.RecordBatch]]) -> NDArray[np.int32]:
         """Return the thread of each event, batch after batch."""
         pairs = np.concatenate(
             [
@@ -204,25 +134,26 @@ class _Threads:
 
 
 def _new_threads(
-    batches: Sequence[tuple[str, pa.RecordBatch]], threads: NDArray[np.int32], known: int
-) -> pa.RecordBatch:
+    batches: Sequence[tuple[Tracepoint, pa.RecordBatch]], threads: NDArray[np.int32], known: int
+) -> Iterator[Rows]:
+    """Yield the threads that were not there before, with a trace of their host."""
     fresh = np.flatnonzero(threads >= known)
-    if not fresh.size:
-        return empty_batch(THREAD_SCHEMA)
-    found, first = np.unique(threads[fresh], return_index=True)
-    rows = fresh[first]
-    columns = [
-        to_arrow(gathered(batches, name)[rows], ~present(batches, name)[rows])
-        for name in THREAD_SCHEMA.names[1:]
-    ]
-    return pa.RecordBatch.from_arrays([to_arrow(found), *columns], schema=THREAD_SCHEMA)
+    if fresh.size:
+        found, first = np.unique(threads[fresh], return_index=True)
+        rows = fresh[first]
+        columns = {"thread_index": to_arrow(found)}
+        for name in ("trace_index", "pid_ns", "vpid", "vtid"):
+            is_missing = ~present(batches, name)[rows]
+            columns[name] = to_arrow(gathered(batches, name)[rows], is_missing)
+        yield "thread", pa.RecordBatch.from_pydict(columns)
 
 
 def _names(
-    batches: Sequence[tuple[str, pa.RecordBatch]],
+    batches: Sequence[tuple[Tracepoint, pa.RecordBatch]],
     groups: Groups,
     events: Mapping[Origin, NDArray[Any]],
-) -> pa.RecordBatch:
+) -> Rows:
+    """Return the stretches of events of a thread under one name; several may follow each other."""
     encoded = pa.chunked_array([batch["procname"] for _, batch in batches]).unify_dictionaries()
     codes = np.concatenate(
         [
@@ -234,28 +165,24 @@ def _names(
     is_start[groups.starts] = True
     starts = np.flatnonzero(is_start)
     ends = np.append(starts[1:], codes.size) - 1
-    names = codes[starts]
-    return pa.RecordBatch.from_arrays(
-        [
-            to_arrow(groups.groups[starts]),
-            pa.DictionaryArray.from_arrays(
-                to_arrow(names, names == NONE), encoded.chunks[0].dictionary
-            ),
-            *(
-                to_arrow(events[origin][at])
-                for origin in (Origin.EVENT_ID, Origin.TS_NS)
-                for at in (starts, ends)
-            ),
-        ],
-        schema=THREAD_NAME_SCHEMA,
-    )
+    names = to_arrow(codes[starts], codes[starts] == NONE)
+    columns = {
+        "thread_index": to_arrow(groups.groups[starts]),
+        "procname": pa.DictionaryArray.from_arrays(names, encoded.chunks[0].dictionary),
+        "first_event_id": to_arrow(events[Origin.EVENT_ID][starts]),
+        "last_event_id": to_arrow(events[Origin.EVENT_ID][ends]),
+        "first_seen_ns": to_arrow(events[Origin.TS_NS][starts]),
+        "last_seen_ns": to_arrow(events[Origin.TS_NS][ends]),
+    }
+    return "thread_name", pa.RecordBatch.from_pydict(columns)
 
 
 def _cpu_returns(
-    batches: Sequence[tuple[str, pa.RecordBatch]],
+    batches: Sequence[tuple[Tracepoint, pa.RecordBatch]],
     groups: Groups,
     events: Mapping[Origin, NDArray[Any]],
-) -> pa.RecordBatch:
+) -> Iterator[Rows]:
+    """Yield the events of a thread that changed its CPU twice faster than a thread can."""
     cpus = gathered(batches, "cpu_id")[groups.rows]
     is_change = np.append(False, cpus[1:] != cpus[:-1])
     is_change[groups.starts] = False
@@ -266,7 +193,9 @@ def _cpu_returns(
         times[second] - times[first - 1] < _SHORTEST_RETURN_NS
     )
     found = second[is_fast]
-    return pa.RecordBatch.from_arrays(
-        [to_arrow(groups.groups[found]), to_arrow(events[Origin.EVENT_ID][found])],
-        schema=CPU_RETURN_SCHEMA,
-    )
+    if found.size:
+        columns = {
+            "thread_index": to_arrow(groups.groups[found]),
+            "event_id": to_arrow(events[Origin.EVENT_ID][found]),
+        }
+        yield "cpu_return", pa.RecordBatch.from_pydict(columns)

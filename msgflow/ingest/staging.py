@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     import duckdb
     import pyarrow as pa
 
-    from msgflow.ingest.sequences import Placed
-
 # Rows that wait for a commit take memory that nothing limits.
 _ROWS_PER_TRANSACTION = 2_000_000
 # A row group of DuckDB: fewer rows at once cost more each.
@@ -163,18 +161,6 @@ class RawTables:
         self._uncommitted = 0
         # Ids of the runs that hold some of the packets added already.
         self.replaced: set[int] = set()
-
-    def add_all(self, item: Placed | tuple[str, pa.RecordBatch]) -> None:
-        """Add the events of a round, or (table, rows)."""
-        if isinstance(item, tuple):
-            self.add(*item)
-            return
-        self.add("thread", item.threads)
-        self.add("thread_name", item.thread_names)
-        self.add("cpu_return", item.cpu_returns)
-        staged = load().staged
-        for name, rows in item.batches:
-            self.add(staged[name].table, rows)
 
     def add(self, table: str, rows: pa.RecordBatch) -> None:
         """Add rows to a table."""

@@ -140,7 +140,7 @@ def test_tables_take_the_readers_batches() -> None:
         elif tracepoint.is_kernel:
             _, placed = without_thread(tracepoint, batch)
         else:
-            ((_, placed),) = sequences.place([(tracepoint.name, batch)]).batches
+            _, placed = sequences.place([(tracepoint, batch)])[0]
         con.register("batch", placed)
         con.execute(f'INSERT INTO staging."{tracepoint.table}" SELECT * FROM batch')
         table = con.execute(f'DESCRIBE staging."{tracepoint.table}"').fetchall()

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from msgflow.ingest.catalogue import Origin, load
-from msgflow.ingest.sequences import Placed, Sequences
+from msgflow.ingest.sequences import Sequences
 from msgflow.trace.columns import COMMON_SCHEMA
 
 NAMES = (
@@ -49,8 +49,10 @@ def rounds_of(rounds: list[list[Event]]) -> list[list[Event]]:
     return rounds
 
 
-def place(sequences: Sequences, of_round: list[Event]) -> tuple[list[Event], Placed]:
-    """Give a round to `sequences`, a batch per name, and return the events in order."""
+def place(
+    sequences: Sequences, of_round: list[Event]
+) -> tuple[list[Event], dict[str, list[Event]]]:
+    """Give a round to `sequences`, a batch per name: return the events in order, and all tables."""
     batches = []
     for name in NAMES:
         rows = [{k: v for k, v in event.items() if k != "name"} for event in of_round]
@@ -59,9 +61,18 @@ def place(sequences: Sequences, of_round: list[Event]) -> tuple[list[Event], Pla
         for part in (chosen[: len(chosen) // 2], chosen[len(chosen) // 2 :]):
             if part:
                 schema = pa.schema([*COMMON_SCHEMA, *load().tracepoints[name].arrow_schema()])
-                batches.append((name, pa.RecordBatch.from_pylist(part, schema)))
-    placed = sequences.place(batches)
-    found = [{"name": name} | row for name, batch in placed.batches for row in batch.to_pylist()]
+                tracepoint = load().tracepoints[name]
+                batches.append((tracepoint, pa.RecordBatch.from_pylist(part, schema)))
+    placed: dict[str, list[Event]] = {}
+    for table, batch in sequences.place(batches):
+        placed.setdefault(table, []).extend(batch.to_pylist())
+    tables = {load().tracepoints[name].table: name for name in NAMES}
+    found = [
+        {"name": tables[table]} | row
+        for table, rows in placed.items()
+        if table in tables
+        for row in rows
+    ]
     return sorted(found, key=lambda row: row["event_id"]), placed
 
 
@@ -78,7 +89,7 @@ def test_predecessors_are_the_latest_of_their_sequence(rounds: list[list[Event]]
         if not of_round:
             continue
         found, placed = place(sequences, of_round)
-        for row in placed.threads.to_pylist():
+        for row in placed.get("thread", ()):
             assert row["thread_index"] not in threads
             threads[row["thread_index"]] = (
                 HOSTS[row["trace_index"]],
@@ -86,7 +97,7 @@ def test_predecessors_are_the_latest_of_their_sequence(rounds: list[list[Event]]
                 row["vpid"],
                 row["vtid"],
             )
-        names += [tuple(row.values()) for row in placed.thread_names.to_pylist()]
+        names += [tuple(row.values()) for row in placed["thread_name"]]
         for event, row in zip(of_round, found, strict=True):
             key = (HOSTS[event["trace_index"]], event["pid_ns"], event["vpid"], event["vtid"])
             assert threads[row["thread_index"]] == key
@@ -128,7 +139,7 @@ def test_two_changes_of_the_cpu_in_no_time(of_round: list[Event]) -> None:
         if is_change and before and event["ts_ns"] - before[-1]["ts_ns"] < 10_000:
             expected.append((row["thread_index"], event["event_id"]))
         of_thread.append(event)
-    rows = [tuple(row.values()) for row in placed.cpu_returns.to_pylist()]
+    rows = [tuple(row.values()) for row in placed.get("cpu_return", ())]
     assert sorted(rows, key=lambda row: row[1]) == expected
 
 

@@ -220,24 +220,18 @@ class StagedEvents:
         batches = [(name, batch) for name, batch in batches if batch.num_rows]
         kernel = [(_tracepoint(n), batch) for n, batch in batches if _tracepoint(n).is_kernel]
         of_cpus = [(known, batch) for known, batch in kernel if known.role is not None]
-        placed_there = Cpus(load()).place(of_cpus) if of_cpus else []
-        others = [without_thread(known, batch) for known, batch in kernel if known.role is None]
-        for table, rows in [*placed_there, *others]:
-            _insert(con, f"raw.{table}", rows)
-        batches = [(n, batch) for n, batch in batches if not _tracepoint(n).is_kernel]
-        if batches:
+        placed = Cpus(load()).place(of_cpus) if of_cpus else []
+        placed += [without_thread(known, batch) for known, batch in kernel if known.role is None]
+        of_threads = [(_tracepoint(n), b) for n, b in batches if not _tracepoint(n).is_kernel]
+        if of_threads:
             hosts: dict[tuple[str, str], int] = {}
             sources = [self.sources.get(n, Source()) for n in range(max(self.sources) + 1)]
             numbers = [
                 hosts.setdefault((source.hostname, source.clock), len(hosts)) for source in sources
             ]
-            placed = Sequences(load(), numbers).place(batches)
-            _insert(con, "raw.thread", placed.threads)
-            _insert(con, "raw.thread_name", placed.thread_names)
-            _insert(con, "raw.cpu_return", placed.cpu_returns)
-            for name, batch in placed.batches:
-                _insert(con, f"raw.{load().staged[name].table}", batch)
-        _insert(con, "raw.packet", packets)
+            placed += Sequences(load(), numbers).place(of_threads)
+        for table, rows in [*placed, ("packet", packets)]:
+            _insert(con, f"raw.{table}", rows)
         for sample in self.samples:
             con.execute("INSERT INTO raw.stack_sample VALUES (?, ?, ?, ?)", sample)
 
