@@ -493,8 +493,7 @@ class Database:
             UsageError: not exactly one run, or no such place or time.
             NoFlowError: no flow arrives there.
         """
-        from msgflow.query.why import explain
-        from msgflow.query.why_functions import with_functions
+        from msgflow.query.why import explain, with_functions
 
         one = self._ask(Slice(part.get("run")).one_run, "an explanation")
         times = Slice(one.run_id, part.get("start"), part.get("end"))

@@ -15,7 +15,8 @@ from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
 
 if TYPE_CHECKING:
-    from msgflow.query.compare import Comparison, Differences
+    from msgflow.query.compare import Comparison
+    from msgflow.query.differences import Differences
 
 # Rows on a terminal, where long paths take several lines.
 _MOST_ROWS = 10
@@ -23,7 +24,7 @@ _MOST_ROWS = 10
 
 def _read(conditions: list[str] | None) -> list[str]:
     """Read the conditions before anything is compared."""
-    from msgflow.query.compare import parse_conditions
+    from msgflow.query.differences import parse_conditions
 
     parse_conditions(conditions or [])
     return conditions or []

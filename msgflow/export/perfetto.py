@@ -12,7 +12,7 @@ from msgflow.sql.failure import format_errors
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
     import duckdb
@@ -35,6 +35,7 @@ _IDENTITIES = (
 _LARGEST_INTEGER = 2**63 - 1
 _SYMBOL = len(_IDENTITIES) + 1
 _NUMBERS = ("candidate_count", "queue_ns", "served_ns")
+_KINDS = ("SLICE_END", "SLICE_BEGIN", "INSTANT")  # by the rank of a row
 _CATEGORIES = ("callback", "publication", "take", *["service"] * 4, "executor")
 
 
@@ -93,8 +94,10 @@ def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slic
 
 @dataclass(frozen=True)
 class _Writer:
+    """Writes packets; a message inside of one is a dictionary, in which None stands for nothing."""
+
     builder: Any
-    packets: Any  # the module with the types of packets
+    types: Any  # the module with the types of packets
     connection: duckdb.DuckDBPyConnection
     run: Run
     bindings: dict[str, Any]
@@ -102,191 +105,159 @@ class _Writer:
     def rows(self, name: str) -> Iterator[dict[str, Any]]:
         return internal_sql().rows(self.connection, name, self.bindings)
 
+    def write(self, **fields: Any) -> None:
+        packet = self.types.TracePacket(trusted_packet_sequence_id=_SEQUENCE, **fields)
+        self.builder.write_packet(packet)
+
+    def write_at(self, time_ns: int, **fields: Any) -> None:
+        flags = self.types.TracePacket.SEQ_NEEDS_INCREMENTAL_STATE
+        self.write(timestamp=time_ns, sequence_flags=flags, **fields)
+
+    def track(self, number: int, parent: int | None = None, **what: Any) -> None:
+        self.write(track_descriptor={"uuid": number, "parent_uuid": parent, **what})
+
+    def event(self, time_ns: int, track: int, kind: str, **what: Any) -> None:
+        event = {"type": f"TYPE_{kind}", "track_uuid": track, **what}
+        self.write_at(time_ns, track_event=event)
+
     def describe(self) -> None:
-        start_ns = self.run.start_ns or 0
-        packet = self.builder.create_packet()
         # Timestamps count by the first clock; the second one lets the UI show points in time.
-        for clock in ("BUILTIN_CLOCK_BOOTTIME", "BUILTIN_CLOCK_REALTIME"):
-            number = self.packets.BuiltinClock.Value(clock)
-            packet.clock_snapshot.clocks.add(clock_id=number, timestamp=start_ns)
-        packet.trusted_packet_sequence_id = _SEQUENCE
-        self.builder.write_packet(packet)
+        numbers = map(
+            self.types.BuiltinClock.Value, ("BUILTIN_CLOCK_BOOTTIME", "BUILTIN_CLOCK_REALTIME")
+        )
+        start_ns = self.run.start_ns or 0
+        clocks = [{"clock_id": number, "timestamp": start_ns} for number in numbers]
+        self.write(clock_snapshot={"clocks": clocks})
         for row in self.rows("perfetto_process"):
-            track = self.track(row["track"])
-            track.track_descriptor.process.pid = row["pid"]
-            track.track_descriptor.process.process_name = row["name"]
-            self.builder.write_packet(track)
+            self.track(row["track"], process={"pid": row["pid"], "process_name": row["name"]})
         for row in self.rows("perfetto_thread"):
-            track = self.track(row["track"], row["parent"])
-            track.track_descriptor.thread.pid = row["pid"]
-            track.track_descriptor.thread.tid = row["tid"]
-            track.track_descriptor.thread.thread_name = row["name"]
-            self.builder.write_packet(track)
+            thread = {"pid": row["pid"], "tid": row["tid"], "thread_name": row["name"]}
+            self.track(row["track"], row["parent"], thread=thread)
             if row["has_states"]:
-                track = self.track(row["state_track"], row["track"])
-                track.track_descriptor.name = "executor"
-                self.builder.write_packet(track)
+                self.track(row["state_track"], row["track"], name="executor")
         for row in self.rows("perfetto_counter"):
-            track = self.track(row["track"], row["parent"])
-            track.track_descriptor.name = row["name"]
-            track.track_descriptor.counter.unit_name = row["unit"]
-            self.builder.write_packet(track)
-        self.names()
-
-    def track(self, number: int, parent: int | None = None) -> Any:
-        packet = self.builder.create_packet()
-        packet.trusted_packet_sequence_id = _SEQUENCE
-        packet.track_descriptor.uuid = number
-        if parent is not None:
-            packet.track_descriptor.parent_uuid = parent
-        return packet
-
-    def names(self) -> None:
-        packet = self.builder.create_packet()
-        packet.trusted_packet_sequence_id = _SEQUENCE
-        packet.sequence_flags = self.packets.TracePacket.SEQ_INCREMENTAL_STATE_CLEARED
-        for number, name in enumerate((*_IDENTITIES, "symbol", *_NUMBERS), start=1):
-            packet.interned_data.debug_annotation_names.add(iid=number, name=name)
-        for number, name in enumerate(_CATEGORIES, start=1):
-            packet.interned_data.event_categories.add(iid=number, name=name)
-        for row in self.rows("perfetto_name"):
-            packet.interned_data.event_names.add(
-                iid=row["id"] * 8 + row["code"] + 1, name=row["name"]
-            )
-        for row in self.rows("perfetto_symbol"):
-            packet.interned_data.debug_annotation_string_values.add(
-                iid=row["id"], str=row["name"].encode()
-            )
-        self.builder.write_packet(packet)
-
-    def event(self, row: Mapping[str, Any], kind: int) -> Any:
-        packet = self.builder.create_packet()
-        packet.timestamp = row["at_ns"]
-        packet.trusted_packet_sequence_id = _SEQUENCE
-        packet.sequence_flags = self.packets.TracePacket.SEQ_NEEDS_INCREMENTAL_STATE
-        packet.track_event.type = kind
-        packet.track_event.track_uuid = row["track"]
-        return packet
+            counter = {"unit_name": row["unit"]}
+            self.track(row["track"], row["parent"], name=row["name"], counter=counter)
+        symbols = [
+            {"iid": row["id"], "str": row["name"].encode()} for row in self.rows("perfetto_symbol")
+        ]
+        names = {
+            "debug_annotation_names": _numbered((*_IDENTITIES, "symbol", *_NUMBERS)),
+            "event_categories": _numbered(_CATEGORIES),
+            "event_names": [
+                {"iid": row["id"] * 8 + row["code"] + 1, "name": row["name"]}
+                for row in self.rows("perfetto_name")
+            ],
+            "debug_annotation_string_values": symbols,
+        }
+        flags = self.types.TracePacket.SEQ_INCREMENTAL_STATE_CLEARED
+        self.write(sequence_flags=flags, interned_data=names)
 
     def slices(self) -> tuple[int, int]:
         """Return how many slices were written, and how many arrows begin at them."""
-        kind = self.packets.TrackEvent
-        kinds = (kind.TYPE_SLICE_END, kind.TYPE_SLICE_BEGIN, kind.TYPE_INSTANT)
         slices = arrows = 0
         for row in self.rows("perfetto_slice"):
-            packet = self.event(row, kinds[row["rank"]])
+            what: dict[str, Any] = {}
             if row["rank"]:
-                slices += 1
-                event = packet.track_event
-                event.name_iid = row["name"]
-                event.category_iids.append(row["code"] + 1)
-                event.debug_annotations.add(name_iid=row["code"] + 1, int_value=row["id"])
+                notes = [{"name_iid": row["code"] + 1, "int_value": row["id"]}]
                 if row["symbol_id"] is not None:
-                    event.debug_annotations.add(name_iid=_SYMBOL, string_value_iid=row["symbol_id"])
-                for number, name in enumerate(_NUMBERS, start=_SYMBOL + 1):
-                    if row[name] is not None:
-                        event.debug_annotations.add(name_iid=number, int_value=row[name])
-                if row["outgoing"]:
-                    event.flow_ids.extend(row["outgoing"])
-                    arrows += len(row["outgoing"])
-                if row["incoming"]:
-                    event.terminating_flow_ids.extend(row["incoming"])
-            self.builder.write_packet(packet)
+                    notes.append({"name_iid": _SYMBOL, "string_value_iid": row["symbol_id"]})
+                notes += [
+                    {"name_iid": number, "int_value": row[name]}
+                    for number, name in enumerate(_NUMBERS, start=_SYMBOL + 1)
+                    if row[name] is not None
+                ]
+                what = {
+                    "name_iid": row["name"],
+                    "category_iids": [row["code"] + 1],
+                    "debug_annotations": notes,
+                    "flow_ids": row["outgoing"],
+                    "terminating_flow_ids": row["incoming"],
+                }
+                slices += 1
+                arrows += len(row["outgoing"] or ())
+            self.event(row["at_ns"], row["track"], _KINDS[row["rank"]], **what)
         return slices, arrows
 
     def values(self) -> int:
         count = 0
         for row in self.rows("perfetto_value"):
-            packet = self.event(row, self.packets.TrackEvent.TYPE_COUNTER)
-            packet.track_event.double_counter_value = row["value"]
-            self.builder.write_packet(packet)
+            self.event(row["at_ns"], row["track"], "COUNTER", double_counter_value=row["value"])
             count += 1
         return count
 
     def named_slices(self, query: str, category: str, noted: Mapping[str, str]) -> int:
-        kind = self.packets.TrackEvent
         count = 0
         known = None
         for row in self.rows(query):
             if row["track"] != known:
                 known = row["track"]
-                track = self.track(known, row.get("parent"))
-                track.track_descriptor.name = row["track_name"]
-                self.builder.write_packet(track)
-            begin = self.event(row | {"at_ns": row["start_ns"]}, kind.TYPE_SLICE_BEGIN)
-            begin.track_event.name = row["name"]
-            begin.track_event.categories.append(category)
-            for name, column in noted.items():
-                if row[column] is not None:
-                    _add_argument(begin.track_event, name, row[column])
-            self.builder.write_packet(begin)
-            self.builder.write_packet(
-                self.event(row | {"at_ns": row["end_ns"]}, kind.TYPE_SLICE_END)
-            )
+                self.track(known, row.get("parent"), name=row["track_name"])
+            said = {name: row[column] for name, column in noted.items()}
+            self.event(
+                row["start_ns"], row["track"], "SLICE_BEGIN",
+                name=row["name"], categories=[category],
+                debug_annotations=[_note(*each) for each in said.items() if each[1] is not None],
+            )  # fmt: skip
+            self.event(row["end_ns"], row["track"], "SLICE_END")
             count += 1
         return count
 
     def user_events(self) -> int:
         count = 0
         for row in self.rows("perfetto_event"):
-            packet = self.event(row, self.packets.TrackEvent.TYPE_INSTANT)
-            event = packet.track_event
-            event.name = row["name"]
-            event.categories.append("user_event")
-            event.debug_annotations.add(name="user_event_id", int_value=row["id"])
-            for name, value in json.loads(row["fields"]).items():
-                _add_argument(event, name, value)
-            self.builder.write_packet(packet)
+            fields = [("user_event_id", row["id"]), *json.loads(row["fields"]).items()]
+            self.event(
+                row["at_ns"], row["track"], "INSTANT", name=row["name"], categories=["user_event"],
+                debug_annotations=[_note(name, value) for name, value in fields],
+            )  # fmt: skip
             count += 1
         return count
 
     def samples(self) -> int:
         """Write samples of stacks, each stack and function once; return how many samples."""
-        packet = self.builder.create_packet()
-        packet.trusted_packet_sequence_id = _SEQUENCE
-        counter = self.packets.PerfEvents.Counter
-        timebase = packet.trace_packet_defaults.perf_sample_defaults.timebase
-        timebase.counter = counter.SW_CPU_CLOCK
-        interned = packet.interned_data
-        for row in self.rows("perfetto_frame"):
-            if row["id"] == row["file_id"]:
-                interned.mapping_paths.add(iid=row["id"], str=row["file"].encode())
-                interned.mappings.add(iid=row["id"], path_string_ids=[row["id"]])
-            interned.function_names.add(iid=row["id"], str=row["name"].encode())
-            interned.frames.add(
-                iid=row["id"], function_name_id=row["id"], mapping_id=row["file_id"]
-            )
-        if not interned.frames:
+        frames = list(self.rows("perfetto_frame"))
+        if not frames:
             return 0
-        for row in self.rows("perfetto_stack"):
-            interned.callstacks.add(iid=row["stack_id"], frame_ids=row["frames"])
-        self.builder.write_packet(packet)
+        files = [row for row in frames if row["id"] == row["file_id"]]
+        interned = {
+            "mapping_paths": [{"iid": row["id"], "str": row["file"].encode()} for row in files],
+            "mappings": [{"iid": row["id"], "path_string_ids": [row["id"]]} for row in files],
+            "function_names": [{"iid": row["id"], "str": row["name"].encode()} for row in frames],
+            "frames": [
+                {"iid": row["id"], "function_name_id": row["id"], "mapping_id": row["file_id"]}
+                for row in frames
+            ],
+            "callstacks": [
+                {"iid": row["stack_id"], "frame_ids": row["frames"]}
+                for row in self.rows("perfetto_stack")
+            ],
+        }
+        timebase = {"counter": self.types.PerfEvents.Counter.SW_CPU_CLOCK}
+        defaults = {"perf_sample_defaults": {"timebase": timebase}}
+        self.write(trace_packet_defaults=defaults, interned_data=interned)
         count = 0
         for row in self.rows("perfetto_sample"):
-            packet = self.builder.create_packet()
-            packet.timestamp = row["at_ns"]
-            packet.trusted_packet_sequence_id = _SEQUENCE
-            packet.sequence_flags = self.packets.TracePacket.SEQ_NEEDS_INCREMENTAL_STATE
-            sample = packet.perf_sample
-            sample.cpu, sample.pid, sample.tid = row["cpu"], row["pid"], row["tid"]
-            sample.callstack_iid = row["stack_id"]
-            self.builder.write_packet(packet)
+            sample = {name: row[name] for name in ("cpu", "pid", "tid")}
+            self.write_at(row["at_ns"], perf_sample={**sample, "callstack_iid": row["stack_id"]})
             count += 1
         return count
 
 
-def _add_argument(event: Any, name: str, value: Any) -> None:
-    argument = event.debug_annotations.add(name=name)
+def _numbered(names: Sequence[str]) -> list[dict[str, Any]]:
+    return [{"iid": number, "name": name} for number, name in enumerate(names, start=1)]
+
+
+def _note(name: str, value: Any) -> dict[str, Any]:
     match value:
         case bool():
-            argument.bool_value = value
-        case int() if value > _LARGEST_INTEGER:
-            argument.uint_value = value
+            kind = "bool_value"
         case int():
-            argument.int_value = value
+            kind = "uint_value" if value > _LARGEST_INTEGER else "int_value"
         case float():
-            argument.double_value = value
+            kind = "double_value"
         case str():
-            argument.string_value = value
+            kind = "string_value"
         case _:
-            argument.legacy_json_value = json.dumps(value)
+            kind, value = "legacy_json_value", json.dumps(value)
+    return {"name": name, kind: value}

@@ -12,7 +12,8 @@ import pyarrow as pa
 
 from msgflow.errors import UsageError
 from msgflow.fleet.lake_connection import Choice, Reading, choose
-from msgflow.query.compare import STATISTICS, Differences, share_of
+from msgflow.query.compare import share_of
+from msgflow.query.differences import STATISTICS, Differences
 from msgflow.query.selection import CASES, CUT_COLUMN
 from msgflow.query.several_runs import compared
 from msgflow.text.name_suggestions import meant_or, nearest

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import groupby
-from operator import itemgetter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     import duckdb
     import pyarrow as pa
@@ -28,26 +26,7 @@ def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> l
     )
     if not several.fetchall():
         return []
-    groups = internal_sql().run(connection, "clock_group", chosen).fetchall()
-    clocks = {
-        run_id: (len(together), "FILE" if together[0][-1] else "messages")
-        for run_id, (*together,) in groupby(groups, key=itemgetter(0))
-        if len(together) > 1
-    }
-    corrections = internal_sql().run(connection, "clock_correction", chosen).fetchall()
-    return [
-        f"{'the run' if len(runs) == 1 else f'run {run.title}'} has"
-        f" {clocks[run.run_id][0]} clocks that are not synchronised: times between their hosts are"
-        f" not comparable; msgflow clocks apply {clocks[run.run_id][1]}"
-        for run in runs
-        if run.run_id in clocks
-    ] + [
-        f"{'' if len(runs) == 1 else f'run {run.title}: '}times between {reference}"
-        f" and {hosts} {_wrong_by(least, greatest)}; msgflow clocks"
-        for run in runs
-        for run_id, reference, hosts, least, greatest in corrections
-        if run_id == run.run_id
-    ]
+    return _sentences(connection, "clock_note", chosen)
 
 
 def untraced_notes(
@@ -77,34 +56,12 @@ def clock_verdicts(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], *, only_several: bool = False
 ) -> list[str]:
     """Return a sentence per run, or per run with several clocks: whether times of hosts compare."""
-    chosen = {"runs": [run.run_id for run in runs]}
-    rows = internal_sql().run(connection, "clock_group", chosen).fetchall()
-    verdicts = []
-    for run in runs:
-        groups = [tuple(row[1:]) for row in rows if row[0] == run.run_id]
-        if not groups or (only_several and len(groups) == 1 and groups[0][1] == 1):
-            continue
-        label = "" if len(runs) == 1 else f"run {run.title}: "
-        verdicts.append(label + _verdict(groups))
-    return verdicts
+    chosen = {"runs": [run.run_id for run in runs], "only_several": only_several}
+    return _sentences(connection, "clock_verdict", chosen)
 
 
-def _verdict(groups: Sequence[tuple[str, int, float | None, bool]]) -> str:
-    if len(groups) > 1:
-        cure = "FILE" if groups[0][3] else "messages"
-        return (
-            f"the clocks of {' | '.join(hosts for hosts, *_ in groups)} are not synchronised: times"
-            f" between them cannot be compared; cure: msgflow clocks apply {cure}"
-        )
-    ((hosts, clocks, greatest_ms, _),) = groups
-    if clocks == 1:
-        return f"one clock ({hosts}): all times can be compared"
-    if greatest_ms is None:
-        return f"the clocks of {hosts} are together, as far as the file with their offsets is right"
-    return f"the clocks of {hosts} are together within ±{greatest_ms:.3f} ms"
-
-
-def _wrong_by(least_ms: float | None, greatest_ms: float | None) -> str:
-    if least_ms is None or greatest_ms is None:
-        return "are off by as much as the file with their offsets is"
-    return f"are known to ±{least_ms:.3f} ms at best and ±{greatest_ms:.3f} ms at worst"
+def _sentences(
+    connection: duckdb.DuckDBPyConnection, name: str, chosen: Mapping[str, Any]
+) -> list[str]:
+    found = internal_sql().run(connection, name, chosen)
+    return [sentence for (sentence,) in found.fetchall()]

@@ -1,20 +1,22 @@
-"""Comparison of two runs, and conditions that say how much worse one may be."""
+"""Comparison of two runs, or of several on either side."""
 
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+import duckdb
+
 from msgflow.errors import UsageError
 from msgflow.files.resources import resource_directory
-from msgflow.query.change_parts import change_parts
+from msgflow.query.catalogue import load_query
 from msgflow.query.clock_notes import clock_notes
+from msgflow.query.differences import STATISTICS, Differences
 from msgflow.query.doubt_notes import AMBIGUOUS, doubt_notes
 from msgflow.query.names import require_places
-from msgflow.query.runner import bind
+from msgflow.query.runner import bind, run_query
 from msgflow.query.schedule_notes import function_notes, schedule_notes
 from msgflow.query.selection import CUT_COLUMN
 from msgflow.query.several_runs import LEAST_RUNS, compare_sides
@@ -24,37 +26,20 @@ from msgflow.run.slice import Slice
 from msgflow.run.window import MAXIMUM_NS
 from msgflow.sql.failure import query_errors
 from msgflow.sql.header import Header, read
-from msgflow.sql.statement import internal_sql
+from msgflow.sql.statement import internal_sql, registered
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    import duckdb
+    from collections.abc import Iterable, Mapping, Sequence
 
     from msgflow.sql.value import Value
 
-STATISTICS = ("median", "mean", "p95", "p99", "max")
-SHARE = "share"
 DEFAULT_RESAMPLES = 1_000
-_CONDITION = re.compile(
-    rf"\s*(?:(?P<statistic>{'|'.join(STATISTICS)})\s*>\s*(?P<limit>\d+(?:\.\d+)?)"
-    rf"\s*(?P<unit>%|ns|us|µs|ms|s)|{SHARE}\s*<\s*-\s*(?P<points>\d+(?:\.\d+)?)\s*%)\s*"
-)
-_UNIT_NS = {"ns": 1, "us": 1_000, "µs": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
 _CUT = (
     "paths beyond the limits are left out; --max-paths and --max-depth raise them, --from and --to"
     " choose"
 )
 _UNITS = {"paths": "flows", "ends": "flows", "callbacks": "callback instances", "topics": "takes"}
-# What a verdict adds to a failure: the measured values decide, and these may be chance.
-_CHANCE = {
-    "no difference shown": "; it may be chance",
-    "about equal": "; less than --at-least",
-    "too few values": "; too few values to exclude chance",
-    "too few independent values": "; too few independent values to exclude chance",
-    "too few runs": "; too few runs to exclude chance",
-    "not estimated": "; one value of each, it may be chance",
-}
+_OF_PARTS = ("from", "to", "case", "max_depth", "max_paths")
 # Warm-up is left out in steps of half a second.
 _STEP_NS = 500_000_000
 _LOST = """
@@ -63,81 +48,6 @@ FROM main.trace
 WHERE list_contains($runs, run_id)
 GROUP BY run_id
 """
-
-
-@dataclass(frozen=True)
-class Condition:
-    """A condition under which run B is worse than it may be."""
-
-    text: str  # as the user wrote it, such as 'p95>5%' or 'share<-1%'
-    statistic: str  # one of STATISTICS, or SHARE
-    limit: float  # in percent of run A, or in nanoseconds; for a share in percentage points
-    is_relative: bool  # the limit is in percent
-
-
-@dataclass(frozen=True)
-class Failure:
-    """A path, callback or topic that is worse than it may be.
-
-    Attributes:
-        condition: as the user wrote it.
-        subject: the path, callback or topic.
-        reason: the measured difference.
-    """
-
-    condition: str
-    subject: str
-    reason: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Differences:
-    """How runs of one side differ from those of another.
-
-    Attributes:
-        result: one row per path (callback, topic) and statistic, see `main.comparison`; of several
-            runs `internal.fleet_comparison`.
-        parts: what the differences of the means of paths consist of, see `internal.change_part`;
-            None unless asked for.
-        all_paths: how to compare all paths, where some are left out.
-    """
-
-    result: QueryResult
-    parts: QueryResult | None = None
-    all_paths: str = "a higher --max-paths or --max-depth, or --from and --to"
-
-    def changes(self, *, only_different: bool = True) -> QueryResult:
-        """Return a row for each path, callback or topic, the greatest change first.
-
-        Args:
-            only_different: leave out those without a proven difference.
-        """
-        from msgflow.query.comparison_summary import changes
-
-        return changes(self.result, only_different)
-
-    def failures(self, conditions: Iterable[str]) -> list[Failure]:
-        """Return what exceeds A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
-
-        'share<-1%' limits how much less may arrive: the share in B may be that many points below
-        the share in A. A subject with values in A and none in B fails, too. The measured values
-        decide, even if the difference may be chance.
-        """
-        wanted = parse_conditions(conditions)
-        rows = self.result.to_arrow().to_pylist()
-        if wanted and any(row[CUT_COLUMN] for row in rows):
-            raise UsageError(
-                f"not all paths were compared, so that nothing holds of all — {wanted[0].text}",
-                self.all_paths,
-            )
-        return [
-            Failure(condition.text, row["subject"], reason + _chance(condition, row))
-            for condition in wanted
-            for row in rows
-            if row["statistic"]
-            == (STATISTICS[0] if condition.statistic == SHARE else condition.statistic)
-            and (reason := _excess(condition, row)) is not None
-        ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,72 +69,6 @@ class Comparison(Differences):
 
     def _repr_html_(self) -> str:
         return self.changes(only_different=False)._repr_html_()
-
-
-def parse_conditions(texts: Iterable[str]) -> list[Condition]:
-    """Read conditions; several may stand in one text, separated by commas."""
-    parts = [part for text in texts for part in text.split(",")]
-    return [_parse(part) for part in parts]
-
-
-def _parse(text: str) -> Condition:
-    found = _CONDITION.fullmatch(text)
-    if found is None:
-        raise UsageError(
-            f"cannot read the condition — {text.strip() or 'an empty one'}",
-            "such as 'p95>5%' or 'median>2ms', of " + ", ".join(STATISTICS) + ", or 'share<-1%'",
-        )
-    if found["points"] is not None:
-        return Condition(text.strip(), SHARE, float(found["points"]), True)
-    unit = found["unit"]
-    return Condition(
-        text.strip(), found["statistic"], float(found["limit"]) * _UNIT_NS.get(unit, 1), unit == "%"
-    )
-
-
-def _excess(condition: Condition, row: dict[str, Any]) -> str | None:
-    a_ns, b_ns = row["a_ns"], row["b_ns"]
-    if condition.statistic == SHARE:
-        return _shortfall(condition, row["a_share"], row["b_share"])
-    if a_ns is None:
-        return None
-    if b_ns is None:
-        return "has no value in B"
-    difference = b_ns - a_ns
-    if not condition.is_relative:
-        return f"{_ms(difference)} more" if difference > condition.limit else None
-    if a_ns < 0:
-        raise UsageError(
-            f"no percentage can be told of {_ms(a_ns)} in A: {condition.text} — {row['subject']}",
-            "msgflow clocks apply messages, or a limit in ns, us, ms or s",
-        )
-    if a_ns == 0:
-        return f"{_ms(b_ns)}, and 0 ms in A" if difference > 0 else None
-    if difference * 100 > condition.limit * a_ns:
-        return f"{100 * difference / a_ns:.4g} % more ({_ms(a_ns)} to {_ms(b_ns)})"
-    return None
-
-
-def _chance(condition: Condition, row: dict[str, Any]) -> str:
-    if condition.statistic == SHARE or row["b_ns"] is None:
-        return ""
-    return _CHANCE.get(row["verdict"], "")
-
-
-def _shortfall(condition: Condition, a_share: float | None, b_share: float | None) -> str | None:
-    if a_share is None:
-        return None
-    if b_share is None:
-        return "has nothing in B that could arrive"
-    # Shares have four digits.
-    points = round(100 * (a_share - b_share), 2)
-    if points > condition.limit:
-        return f"{points:.4g} points less ({100 * a_share:.4g} % to {100 * b_share:.4g} %)"
-    return None
-
-
-def _ms(nanoseconds: float) -> str:
-    return f"{nanoseconds / 1e6:.6g} ms"
 
 
 def compare(
@@ -275,9 +119,34 @@ def compare(
         compared.result.notes.extend(_slow_starts(compared))
     if not explain:
         return compared
-    times = [*(window or ("..", ".."))]
-    parts = change_parts(connection, compared.result, compared.skipped, asked, times)
-    return replace(compared, parts=parts)
+    return replace(compared, parts=_parts(connection, compared, asked, window or ("..", "..")))
+
+
+def _parts(
+    connection: duckdb.DuckDBPyConnection,
+    compared: Comparison,
+    asked: Mapping[str, Any],
+    windows: Sequence[str],
+) -> QueryResult:
+    """Return the parts of the difference of the means of each path, the largest first.
+
+    `asked` are the parameters of the comparison, and `windows` 'START..END' of either side.
+    """
+    parameters = {name: asked[name] for name in _OF_PARTS}
+    skipped = str(compared.skipped) if compared.skipped else None
+    tables = {"compared": compared.result.table}
+    for side, run, window in zip("ab", compared.result.runs, windows, strict=True):
+        start, _, end = window.partition("..")
+        part = Slice(run.run_id, start or skipped, end or None)
+        found = run_query(connection, load_query("path-breakdown"), parameters, part)
+        tables[f"part_{side}"] = found.table
+        values = {"run_id": run.run_id, **part.window([run]).bindings}
+        states = internal_sql().run(connection, "callback_state", values)
+        tables[f"state_{side}"] = states.to_arrow_table()
+    with duckdb.connect() as con, registered(con, **tables):
+        table = internal_sql().run(con, "change_part", {}).to_arrow_table()
+    header = replace(internal_sql().header("change_part"), name="compare --explain")
+    return QueryResult(table, header, compared.result.runs, compared.result.notes)
 
 
 def _side(runs: Sequence[Run], wanted: str | int | None) -> tuple[Run, ...]:

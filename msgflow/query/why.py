@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 _PIECES = 5
 _OF_VERDICT = ("open_end", "why_callback", "suspect")
-_WAITS = 3
 # By what took longest in a slow flow: the query that shows more of it, by node or by topic.
 _BY_NODE = {
     "callback": ("callbacks", "--each", "--slowest", "5"),
@@ -66,6 +65,7 @@ _KNOWN = {
     "critical_piece": "FROM main.critical_piece('critical_part', $runs, waits := 'ready_wait',"
     " has_kernel := $has_kernel, has_calls := $has_calls, has_teams := $has_teams)",
 }
+_SAMPLED = "SELECT 1 FROM main.stack_sample WHERE run_id = ? LIMIT 1"
 # How to know what a sentence says is not known.
 _UNKNOWN = {
     "not known without a kernel trace": "msgflow record --kernel shows what had the CPU",
@@ -74,6 +74,13 @@ _UNKNOWN = {
 # What a path has in place of a topic without a name.
 _UNNAMED = "?"
 _NO_NAMES = (None, _UNNAMED)
+# Rows of an explanation: what its callbacks waited for, what was lost on the way, and the paths.
+_OWN_WAITS = "FROM result WHERE list_contains($callbacks, [node, callback]) LIMIT 3"
+_OWN_LOSSES = (
+    f"FROM result WHERE list_contains($places, coalesce(topic_name, '{_UNNAMED}'))"
+    " AND list_contains($places, subscriber) AND dropped + lost > 0"
+)
+_WORST_FIRST = "FROM result ORDER BY path <> $path, p95_ns DESC NULLS LAST, path"
 # Queries with rows of callbacks: none of what a node without traced callbacks did.
 _OF_CALLBACKS = ("callbacks", "waits")
 
@@ -188,8 +195,8 @@ def _explained(
     places = path.split(" → ")
     flow = ask("critical-path", **ends, via=[path], quantile="p95")
     pieces = flow.table.to_pylist()
-    parts = _rows_where(parts, lambda row: row["path"] == path)
-    callbacks = {(row["node"], row["what"]) for row in parts.table.to_pylist()}
+    parts = _rows(connection, "FROM result WHERE path = $path", parts, path=path)
+    callbacks = [[row["node"], row["what"]] for row in parts.table.to_pylist()]
     # What is said of paths that end at a node which publishes.
     ends_of = [each.split(" → ")[-2:] for each in ([path] if place is None else shown)]
     dead_ends = connection.execute(_DEAD_ENDS, [values["runs"]]).fetchall()
@@ -199,16 +206,9 @@ def _explained(
         if any(node == last and f" on {topic} " in detail for topic, last in ends_of)
     )
     ends_here = list(dict.fromkeys(said))
-    waits = _rows_where(waits, lambda row: (row["node"], row["callback"]) in callbacks)
-    losses = _rows_where(
-        losses,
-        lambda row: (
-            (row["topic_name"] or _UNNAMED) in places
-            and row["subscriber"] in places
-            and row["dropped"] + row["lost"] > 0
-        ),
-    )
-    paths = _worst_first(paths, path)
+    waits = _rows(connection, _OWN_WAITS, waits, callbacks=callbacks)
+    losses = _rows(connection, _OWN_LOSSES, losses, places=places)
+    paths = _rows(connection, _WORST_FIRST, paths, path=path)
     return Explanation(
         run=run,
         start=times.start,
@@ -217,7 +217,7 @@ def _explained(
         paths=paths,
         nodes=_derived(connection, "node_share", "breakdown", parts, path=path),
         slow_flow=_derived(connection, "longest_piece", "slow_flow", flow, count=_PIECES),
-        waits=waits.first(_WAITS),
+        waits=waits,
         losses=losses,
         steps=tuple(dict.fromkeys(_steps(places, ends_here, pieces, losses, skipped))),
         notes=tuple(
@@ -290,27 +290,12 @@ def _nothing(ask: Ask, place: str | None) -> NoFlowError:
     return NoFlowError(message, "msgflow check says where flows break off")
 
 
-def _rows_where(result: QueryResult, is_wanted: Callable[[dict[str, Any]], bool]) -> QueryResult:
-    rows = result.table.to_pylist()
-    return _rows_at(result, [place for place, row in enumerate(rows) if is_wanted(row)])
-
-
-def _rows_at(result: QueryResult, places: Sequence[int]) -> QueryResult:
-    import pyarrow
-
-    # Table.take() would load pandas, which takes longer than all these rows.
-    table = result.table
-    rows = [table.slice(place, 1) for place in places] or [table.slice(0, 0)]
-    return replace(result, table=pyarrow.concat_tables(rows))
-
-
-def _worst_first(paths: QueryResult, first: str) -> QueryResult:
-    rows = paths.table.to_pylist()
-    places = sorted(
-        range(len(rows)),
-        key=lambda place: (rows[place]["path"] != first, -(rows[place]["p95_ns"] or 0)),
-    )
-    return _rows_at(paths, places)
+def _rows(
+    connection: duckdb.DuckDBPyConnection, sql: str, of: QueryResult, **values: Any
+) -> QueryResult:
+    """Return a result with the rows of a query on it, which it calls `result`."""
+    with registered(connection, result=of.table):
+        return replace(of, table=connection.sql(sql, params=values).to_arrow_table())
 
 
 def _derived(
@@ -365,3 +350,25 @@ def _into_flow(
     elif (of_topic := _BY_TOPIC.get(longest["activity"])) and longest["what"] not in _NO_NAMES:
         yield ("query", *of_topic, "--topic", longest["what"], *since)
     yield ("flow", "--take", str(pieces[0]["take_id"]), "--why")
+
+
+def with_functions(
+    connection: duckdb.DuckDBPyConnection, found: Explanation, times: Slice
+) -> Explanation:
+    """Add a sentence with the three functions, where functions were sampled."""
+    parts = found.nodes.table.to_pylist()
+    slowest = next((row for row in parts if row["part"] == "callback"), None)
+    run_id = found.run.run_id
+    if slowest is None or not connection.execute(_SAMPLED, [run_id]).fetchall():
+        return found
+    asked = {"run_id": run_id, "node": slowest["node"], "callback": slowest["what"]}
+    asked |= replace(times, start=found.start).window([found.run]).bindings
+    rows = internal_sql().run(connection, "callback_function", asked).fetchall()
+    if not rows:
+        return found
+    shares = ", ".join(f"{function} {100 * share:.0f} %" for function, share, _ in rows)
+    said = f"CPU time of {slowest['node']} {slowest['what']}: {shares} (of {rows[0][2]:,} samples)"
+    step = ["query", "functions", "--node", slowest["node"], "--callback", slowest["what"]]
+    if times.start is None and found.start is not None:
+        step += ["--start", str(found.start)]
+    return replace(found, notes=(*found.notes, said), steps=(*found.steps, tuple(step)))

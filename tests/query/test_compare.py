@@ -14,7 +14,7 @@ from thorough import thorough
 import msgflow
 from msgflow.db.derivation import derive_table
 from msgflow.errors import UsageError
-from msgflow.query.compare import parse_conditions
+from msgflow.query.differences import parse_conditions
 
 CASES = Path(__file__).parents[1] / "schema" / "cases" / "main.comparison"
 CALLBACKS = 40

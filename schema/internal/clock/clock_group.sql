@@ -1,6 +1,7 @@
 -- description: Clocks that are corrected to the same one. The bound of two clocks is the sum of
 --     theirs, and that of the reference is 0.
 -- grain: one row per clock that others are corrected to, or that stands alone
+-- kind: inline
 WITH known AS (
     SELECT clock_id, max(uncertainty_ns) AS greatest_ns
     FROM main.clock_uncertainty
@@ -19,10 +20,10 @@ bound AS (
 SELECT
     run_id,
     string_agg(hosts, ', ' ORDER BY clock_id) AS hosts,
+    min(clock_id) AS first_clock_id,
     count(*) AS clocks,
     CASE WHEN bool_and(bound_ns IS NOT NULL) THEN list_sum(max(bound_ns, 2)) / 1e6 END
         AS greatest_ms,
     run_id IN (SELECT run_id FROM store.run WHERE clock_sync = 'messages') AS is_tried
 FROM bound
 GROUP BY run_id, together
-ORDER BY run_id, min(clock_id)

@@ -2,7 +2,6 @@
 -- description: A comparison (`compared`: rows of `main.comparison`) with a row for each subject,
 --     those that differ first, then the greatest change of a median.
 -- grain: one row per path, callback or topic
--- param: only_different BOOLEAN  Leave out rows without a shown difference
 -- column: change VARCHAR            'longer', 'shorter', 'both' (of different statistics), 'only in
 --     A', 'only in B', 'about equal' (less than matters), 'none shown' (the intervals contain 0),
 --     or why it is not known: 'too few values', 'too few independent values', 'too few resamples'
@@ -71,7 +70,6 @@ SELECT
     longest.b AS b_max_ns, longest.percent AS max_percent, longest.verdict AS max_verdict,
     a_share, b_share, a_count, b_count, a_ambiguous, b_ambiguous, subject AS path
 FROM subject
-WHERE NOT $only_different OR is_longer OR is_shorter OR only_in IS NOT NULL
 ORDER BY
     is_longer OR is_shorter OR only_in IS NOT NULL DESC,
     abs(median.b - median.a) DESC NULLS FIRST,

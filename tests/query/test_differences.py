@@ -6,7 +6,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from msgflow.query.comparison_summary import changes
+from msgflow.query.differences import Differences
 from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import Run
 
@@ -36,7 +36,7 @@ RESULT = QueryResult(pa.Table.from_pylist(ROWS), notes=["a note"])
 
 
 def test_a_row_for_each_that_differs_the_greatest_change_first() -> None:
-    found = changes(RESULT, only_different=True)
+    found = Differences(result=RESULT).changes(only_different=True)
     rows = found.to_arrow().to_pylist()
     assert [(row["path"], row["change"], row["of"]) for row in rows] == [
         ("/gone", "only in A", None),
@@ -59,14 +59,14 @@ def test_no_difference_says_how_much_was_compared_and_what_could_not_be() -> Non
     ]
     runs = (Run(1, "before", 0), Run(2, "after", 0))
     result = QueryResult(pa.Table.from_pylist(rows), runs=runs)
-    found = changes(result, only_different=True)
+    found = Differences(result=result).changes(only_different=True)
     assert not len(found)
     assert found.when_empty == (
         "no difference is shown between before and after: 3 compared, 1 with no difference shown,"
         " 1 with too few independent values, 1 with too few values: --all lists them"
     )
     assert "note: no difference is shown" in str(found)
-    every = changes(result, only_different=False).to_arrow().to_pylist()
+    every = Differences(result=result).changes(only_different=False).to_arrow().to_pylist()
     assert {row["path"]: row["change"] for row in every} == {
         "/same": "none shown",
         "/few": "too few values",
@@ -75,7 +75,7 @@ def test_no_difference_says_how_much_was_compared_and_what_could_not_be() -> Non
 
 
 def test_all_of_them() -> None:
-    found = changes(RESULT, only_different=False)
+    found = Differences(result=RESULT).changes(only_different=False)
     rows = found.to_arrow().to_pylist()
     # The greatest change of a median comes last: it is not shown to differ.
     assert [row["path"] for row in rows] == ["/gone", "/both", A_TO_B, "/same"]
@@ -89,7 +89,8 @@ def test_all_of_them() -> None:
 def test_the_maximum_has_values_and_a_word() -> None:
     rows = compared("/max", {"median": "no difference shown", "max": "not estimated"}, 100)
     (row,) = (
-        changes(QueryResult(pa.Table.from_pylist(rows)), only_different=False)
+        Differences(result=QueryResult(pa.Table.from_pylist(rows)))
+        .changes(only_different=False)
         .to_arrow()
         .to_pylist()
     )
