@@ -11,9 +11,8 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.text.shell import shell_joined
-from msgflow.view.encoded import encoded_result
 from msgflow.view.page_query import run_page_query
-from msgflow.view.table_encoding import encode
+from msgflow.view.table_encoding import encode, encode_result
 
 if TYPE_CHECKING:
     from msgflow.sql.value import Value
@@ -55,4 +54,4 @@ def critical_path(asked: Question) -> bytes:
         "take_id": end["take_id"],
         "command": shell_joined([*command, "--from", first, "--detail", "full"]),
     }
-    return encoded_result(shown, meta, asked.origin_ns)
+    return encode_result(shown, meta, asked.origin_ns)

@@ -15,28 +15,29 @@ from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.clock_notes import clock_notes
 from msgflow.query.compare import compare, warm_up
-from msgflow.query.runner import run_query
+from msgflow.query.runner import Steps, bind, run_query
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
+from msgflow.sql.statement import internal_sql
 from msgflow.text.shell import shell_joined
 from msgflow.view.critical_path import critical_path
-from msgflow.view.encoded import encoded_comparison, encoded_result, encoded_section
 from msgflow.view.page_query import Scratch, page_query, run_page_query
 from msgflow.view.question import Params, Question
 from msgflow.view.sql_page import examples, words
-from msgflow.view.stacks import stacks, stacks_of_path
 from msgflow.view.summary import (
     MOST_PATHS,
     Section,
     area_section,
     blame_section,
+    encoded_comparison,
+    encoded_section,
     query_section,
     why_section,
 )
-from msgflow.view.table_encoding import encode
+from msgflow.view.table_encoding import encode, encode_result
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection, Sequence
 
     import duckdb
 
@@ -114,24 +115,28 @@ class Pages:
             return why_section(asked)
         if name != "blame":
             return query_section(asked, name, through)
-        flows = self.slowest_flows(asked)
-        rows = asked.rows("path").to_pylist()
-        topics = {row["path_id"]: row["topics"] for row in rows if through in row["path"]}
-        order = [("latency", "descending"), ("path_id", "ascending")]
-        # Several paths may end with the same take: what is said of it once is enough.
-        chosen = {
-            flow["take_id"]: (names[0], names[-1], flow["take_id"])
-            for flow in reversed(flows.sort_by(order).to_pylist())
-            if (names := topics.get(flow["path_id"])) and flow["take_id"] is not None
-        }
-        slowest = list(reversed(chosen.values()))[:MOST_PATHS]
-        return blame_section(asked, slowest)
+        paths = [row["path_id"] for row in asked.rows("path").to_pylist() if through in row["path"]]
+        return blame_section(asked, self.slowest_takes(asked, paths)[:MOST_PATHS])
 
-    def slowest_flows(self, asked: Question) -> pa.Table:
-        """Return the slowest flow of each path that began in the window."""
+    def slowest_flows(self, asked: Question) -> list[dict[str, Any]]:
+        """Return the slowest flow of each path that began in the window, the slowest first."""
         self.fill_flows(asked)
         values = {"run": asked.run.run_id, "limit": 1} | asked.window_of_flows()
-        return self._scratch.ask("path_slowest", values)
+        flows: list[dict[str, Any]] = self._scratch.ask("path_slowest", values).to_pylist()
+        return sorted(flows, key=lambda flow: (-flow["latency"], flow["path_id"]))
+
+    def slowest_takes(self, asked: Question, paths: Collection[int]) -> list[tuple[str, str, int]]:
+        """Return first topic, last topic and take of the slowest flow of each of these paths.
+
+        Several may end with the same take: what is said of it once is enough.
+        """
+        topics = {row["path_id"]: row["topics"] for row in asked.rows("path").to_pylist()}
+        takes: dict[int, tuple[str, str, int]] = {}
+        for flow in self.slowest_flows(asked):
+            names, take = topics.get(flow["path_id"]), flow["take_id"]
+            if flow["path_id"] in paths and names and take is not None:
+                takes.setdefault(take, (names[0], names[-1], take))
+        return list(takes.values())
 
     def fill_flows(self, asked: Question) -> None:
         """Find the flows of all paths of a run, once."""
@@ -179,7 +184,7 @@ def named(asked: Question, name: str) -> tuple[QueryResult, bytes]:
         "description": header.description,
         "command": _command(asked, name),
     }
-    return result, encoded_result(result, meta, asked.origin_ns)
+    return result, encode_result(result, meta, asked.origin_ns)
 
 
 def _plain(name: str, asked: Question) -> bytes:
@@ -216,7 +221,7 @@ def _finding(_: Pages, asked: Question) -> bytes:
 
 
 def _stack(_: Pages, asked: Question) -> bytes:
-    parts: tuple[pa.Table, ...] = (stacks(asked),)
+    parts: tuple[pa.Table, ...] = (_stacks(asked),)
     words = ["export", "folded", "-o", "robot.folded"]
     # Without samples there is nothing to look for.
     if "path" in asked.params and parts[0].num_rows:
@@ -224,7 +229,7 @@ def _stack(_: Pages, asked: Question) -> bytes:
         number, slowest = asked.whole("path"), asked.whole("slowest")
         if number not in paths:
             raise UsageError(f"the run has no such path — {number}")
-        parts = stacks_of_path(asked, paths[number], slowest)
+        parts = _stacks_of_path(asked, paths[number], slowest)
         number = sorted(set(paths.values())).index(paths[number]) + 1
         words = ["query", "functions", "--path", str(number), "--slowest", str(slowest)]
     shown = [part.slice(0, MOST_STACKS) for part in parts]
@@ -237,6 +242,25 @@ def _stack(_: Pages, asked: Question) -> bytes:
         "command": shell_joined(["msgflow", *words, "--run", asked.run.name, *asked.options]),
     }
     return encode(table, meta=meta)
+
+
+def _stacks(asked: Question, instances: Sequence[int] | None = None) -> pa.Table:
+    """Return stacks of callback instances, else of the window; those with most samples first."""
+    values = {"run_id": asked.run.run_id, "instances": instances, **asked.window.bindings}
+    table = internal_sql().run(asked.connection, "folded_stack", values).to_arrow_table()
+    return table.sort_by([("samples", "descending"), ("stack", "ascending")])
+
+
+def _stacks_of_path(asked: Question, path: str, slowest: int) -> tuple[pa.Table, pa.Table]:
+    """Return stacks on the way of so many slowest flows of a path, and of its other flows."""
+    header = load_query("functions")
+    chosen = bind(header, {"via": [path]})
+    with Steps(asked.connection) as steps:
+        steps.make(header, {"runs": [asked.run.run_id], **chosen, **asked.window.bindings})
+        found = asked.connection.table("function_instance").fetchall()
+    slow = [instance for instance, place in found if place <= slowest]
+    others = [instance for instance, place in found if place > slowest]
+    return _stacks(asked, slow), _stacks(asked, others)
 
 
 def _compare(_: Pages, asked: Question) -> bytes:

@@ -20,12 +20,16 @@ from msgflow.query.compare import compare as compare_runs
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.text.values import format_duration
-from msgflow.view.encoded import encoded_comparison, encoded_section
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import LEVEL_BINS, NAMED, SUMMARY, Pages, named
 from msgflow.view.question import Params, Question
 from msgflow.view.single_page import Parts, single_page
-from msgflow.view.summary import change_section, verdict_section
+from msgflow.view.summary import (
+    change_section,
+    encoded_comparison,
+    encoded_section,
+    verdict_section,
+)
 from msgflow.view.summary_markdown import markdown
 from msgflow.view.table_encoding import encode
 
@@ -248,25 +252,23 @@ class _Maker:
                 f"Pictures of {len(numbers)} of {rows.num_rows} paths are in this report, and the"
                 f" timeline has the rows on these: those with {self.through} (--through)."
             )
-        if numbers:
-            worst = self.pages.slowest_flows(self.asked)
-            longest = dict(
-                zip(worst["path_id"].to_pylist(), worst["latency"].to_pylist(), strict=True)
+        if len(numbers) > MOST_PATHS:
+            self.notes.append(
+                f"Pictures of {MOST_PATHS} of {len(numbers)} paths are in this report: those"
+                " with the slowest flows. The table has all of them."
             )
-            if len(numbers) > MOST_PATHS:
-                self.notes.append(
-                    f"Pictures of {MOST_PATHS} of {len(numbers)} paths are in this report: those"
-                    " with the slowest flows. The table has all of them."
-                )
-                numbers = sorted(numbers, key=lambda n: -longest.get(n, -1))[:MOST_PATHS]
+            slowest = [flow["path_id"] for flow in self.pages.slowest_flows(self.asked)]
+            ranks = {number: rank for rank, number in enumerate(slowest)}
+            numbers = sorted(numbers, key=lambda n: ranks.get(n, len(ranks)))[:MOST_PATHS]
         for number in numbers:
             for name in ("path_histogram", "path_share", "path_point", "path_slowest"):
                 self.keep(name, path=number)
         self.keep("path_slowest", limit=1)
-        if numbers:
-            self.keep_critical_paths(
-                worst.filter(compute.is_in(worst["path_id"], pa.array(numbers))), rows
-            )
+        # Critical paths of few flows, as each takes a query.
+        slowest_takes = self.pages.slowest_takes(self.asked, numbers)[:MOST_CRITICAL]
+        for topic, _, take in slowest_takes:
+            content = self.answer("critical", kind="take", id=take, **{"from": topic})
+            self.parts.add(f"critical?id={take}&kind=take", content)
         return numbers
 
     def paths_through(self, paths: pa.Table) -> list[int]:
@@ -278,20 +280,6 @@ class _Maker:
         if not numbers:
             raise UsageError(f"no path has this text — {self.through}", "msgflow query e2e-latency")
         return numbers
-
-    def keep_critical_paths(self, slowest: pa.Table, paths: pa.Table) -> None:
-        """Keep the critical paths of the slowest flows: of few, as each takes a query."""
-        topics = zip(paths["path_id"].to_pylist(), paths["topics"].to_pylist(), strict=True)
-        first = {path: names[0] for path, names in topics}
-        order = [("latency", "descending"), ("path_id", "ascending")]
-        begins = {
-            flow["take_id"]: first[flow["path_id"]]
-            for flow in reversed(slowest.sort_by(order).to_pylist())
-            if flow["take_id"] is not None
-        }
-        for take, topic in list(reversed(begins.items()))[:MOST_CRITICAL]:
-            content = self.answer("critical", kind="take", id=take, **{"from": topic})
-            self.parts.add(f"critical?id={take}&kind=take", content)
 
     def keep_comparison(self, other: Run, comparison: Comparison, chosen: list[int]) -> None:
         content = encoded_comparison(comparison, "paths")
@@ -406,8 +394,7 @@ class _Maker:
         each = window.end_ns - window.start_ns
         share = max(room, 0) / (count * _BYTES_PER_BAR)
         # When the slowest flow of each path began, the slowest first.
-        worst = self.pages.slowest_flows(self.asked)
-        begins = worst.sort_by([("latency", "descending")])["root_at"].to_pylist()
+        begins = [flow["root_at"] for flow in self.pages.slowest_flows(self.asked)]
         middles = begins[:_STRETCHES] or [window.start_ns - origin + each // 2]
         length = max(int(each * share / len(middles)), 1)
         stretches: list[Window] = []

@@ -157,11 +157,7 @@ class SharedDatabase:
 
     def require(self, generation: str | None) -> None:
         """Raise unless the database is still that of a page."""
-        try:
-            is_same = generation is None or generation == generation_of(self.path)
-        except (OSError, DatabaseError):
-            is_same = False
-        if not is_same:
+        if generation is not None and not self._is(generation):
             raise self._replaced()
 
     def answer(
@@ -183,7 +179,7 @@ class SharedDatabase:
             started(cursor)
             content = answers.turns.ask(lambda: answers.pages.answer(cursor, name, params))
         except (MsgflowError, duckdb.Error):
-            if not self._is_same(answers):  # then it was interrupted, or read another file
+            if not self._is(answers.generation):  # then it was interrupted, or read another file
                 raise self._replaced() from None
             raise
         finally:
@@ -192,7 +188,7 @@ class SharedDatabase:
                 self._cursors.discard(cursor)
                 self._asked_at = time.monotonic()
                 self._changed.notify_all()
-        if not self._is_same(answers):  # written in its place, it can be a part of each
+        if not self._is(answers.generation):  # written in its place, it can be a part of each
             raise self._replaced()
         return content
 
@@ -200,7 +196,7 @@ class SharedDatabase:
         # A process has a file of one name open once: the old one is closed before the new one.
         self._asked_at = time.monotonic()
         end = self._asked_at + _MOST_SECONDS_TO_END
-        while self._opened is None or not self._is_same(self._opened.answers):
+        while self._opened is None or not self._is(self._opened.answers.generation):
             if self._cursors:
                 if time.monotonic() > end:
                     raise UnopenedError(
@@ -264,9 +260,9 @@ class SharedDatabase:
             self._answers.pages.close()
             self._answers = None
 
-    def _is_same(self, answers: Answers) -> bool:
+    def _is(self, generation: str) -> bool:
         try:
-            return answers.generation == generation_of(self.path)
+            return generation == generation_of(self.path)
         except (OSError, DatabaseError):
             return False
 

@@ -20,6 +20,7 @@ from msgflow.query.why import explain
 from msgflow.result.query_result import QueryResult
 from msgflow.sql.quoting import literal
 from msgflow.text.shell import shell_joined
+from msgflow.view.table_encoding import encode_result
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -191,3 +192,29 @@ def change_section(comparison: Comparison) -> Section:
     if not len(changes):
         reading = changes.when_empty
     return Section("change", changes, (command,), reading)
+
+
+def encoded_comparison(comparison: Comparison, what: str, *, is_quick: bool = False) -> bytes:
+    """Return a comparison of runs as bytes, for the page of the comparison."""
+    names = [comparison.run_a.name, comparison.run_b.name]
+    meta = {
+        "a": names[0],
+        "b": names[1],
+        "is_quick": is_quick,
+        "command": shell_joined(
+            ["msgflow", "compare", *names] + ["--what", what] * (what != "paths")
+        ),
+    }
+    return encode_result(comparison.result, meta)
+
+
+def encoded_section(section: Section, origin_ns: int) -> bytes:
+    """Return a section of the summary as bytes; points in time count from `origin_ns`."""
+    meta = {
+        "title": section.title,
+        "reading": section.reading,
+        "when_empty": section.when_empty,
+        "shown": section.columns,
+        "commands": section.commands,
+    }
+    return encode_result(section.result, meta, origin_ns)

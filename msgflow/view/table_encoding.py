@@ -24,6 +24,8 @@ from msgflow.trace.numpy_arrow import is_valid, to_numpy
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from msgflow.result.query_result import QueryResult
+
 LARGEST_EXACT = 2**53
 _EPOCH = "epoch ns"
 
@@ -49,6 +51,16 @@ def encode(
     content = {"rows": table.num_rows, "meta": dict(meta or {}), "columns": columns}
     head_bytes = json.dumps(content, ensure_ascii=False, separators=(",", ":")).encode()
     return b"".join([len(head_bytes).to_bytes(4, "little"), head_bytes, *buffers])
+
+
+def encode_result(result: QueryResult, meta: Mapping[str, Any], origin_ns: int = 0) -> bytes:
+    """Return rows as bytes, with their notes and what their columns mean beside `meta`."""
+    columns = result.header.columns if result.header else ()
+    said = {
+        "notes": result.notes,
+        "columns": {column.name: column.description for column in columns},
+    }
+    return encode(result.to_arrow(), meta={**meta, **said}, origin_ns=origin_ns, units=result.units)
 
 
 def _column(column: pa.Array, origin: int) -> tuple[dict[str, Any], bytes]:

@@ -1,10 +1,10 @@
--- description: Where flows that start at one place end, and where those begin that arrive at
---     another, if no path leads from the one to the other. Of the nodes where flows end, those
---     count that publish towards the other place. If there are none, those count where a link may
---     be missing (main.dead_end). If there are none either, those that publish count, else all.
+-- description: A sentence: where flows that start at one place end, and where those begin that
+--     arrive at another, if no path leads from the one to the other. Of the nodes where flows end,
+--     those count that publish towards the other place. If there are none, those count where a link
+--     may be missing (main.dead_end). If there are none either, those that publish count, else all.
 -- grain: one row, or none if there is a path
--- param: from VARCHAR  Topics or nodes where flows start: names or globs, separated by commas
--- param: to VARCHAR  Topics or nodes where they end, in the same form
+-- param: from VARCHAR[]  Topics or nodes where flows start: names or globs
+-- param: to VARCHAR[]  Topics or nodes where they end, likewise
 WITH RECURSIVE start_place AS MATERIALIZED (FROM derive.place($runs, $from)),
 end_place AS MATERIALIZED (FROM derive.place($runs, $to)),
 hop AS MATERIALIZED (
@@ -79,12 +79,24 @@ first AS (
     JOIN store.process AS p ON n.process_id = p.process_id
 )
 SELECT
-    nullif(l.nodes, '') AS last,
-    nullif(l.topics, '') AS last_topics,
-    nullif(f.nodes, '') AS first,
-    coalesce(l.is_joint, false) AS is_joint,
-    coalesce(l.is_dead_end, false) AS is_dead_end,
-    coalesce(l.is_sink, false) AS is_sink
+    CASE
+        WHEN coalesce(l.nodes, '') = ''
+            THEN format('no message of {} was received', array_to_string($from, ', '))
+        ELSE concat(
+            format('flows from {} end at {}', array_to_string($from, ', '), l.nodes),
+            format(' (on {}), ', coalesce(nullif(l.topics, ''), '?')),
+            CASE
+                WHEN l.is_joint THEN 'which publishes towards ' || array_to_string($to, ', ')
+                WHEN coalesce(f.nodes, '') = ''
+                    THEN 'and nothing arrives at ' || array_to_string($to, ', ')
+                ELSE format('and those to {} begin at {}', array_to_string($to, ', '), f.nodes)
+            END,
+            CASE
+                WHEN l.is_dead_end THEN ': msgflow suggest links'
+                WHEN NOT l.is_sink THEN ': a link may be missing (msgflow links apply FILE)'
+            END
+        )
+    END AS sentence
 FROM last AS l
 CROSS JOIN first AS f
 WHERE NOT EXISTS (SELECT 1 FROM onward WHERE is_last)
