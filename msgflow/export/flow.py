@@ -35,25 +35,7 @@ if TYPE_CHECKING:
     from msgflow.sql.value import Value
 
 _LINK = ("link_kind", "wait_ns", "stored_ns", "candidate_count", "is_loss_affected")
-_NODE = (
-    "kind",
-    "id",
-    "depth",
-    "start_ns",
-    "end_ns",
-    "node",
-    "label",
-    "topic_name",
-    "symbol",
-    "thread",
-    "host",
-    "busy_min_ns",
-    "busy_max_ns",
-    "until_ns",
-    "user_events",
-    "otherwise_published",
-    "calls",
-)
+_OF_EDGE = {"run_id", "from_kind", "from_id", *_LINK}
 _STATE = ("missing", "reason", "cut_count", "internal_count")
 _UNBOUNDED = 100_000
 _LEAST_WIDTH = 44
@@ -126,9 +108,9 @@ class Flow:
         """Vertices by (kind, id), nearest to the start first."""
         found: dict[Key, Row] = {}
         for row in self.table.to_pylist():
+            node = {name: value for name, value in row.items() if name not in _OF_EDGE}
             # The edge says that a message was not taken: the subscription may miss several.
-            state = dict.fromkeys(_STATE) if row["kind"] == NOT_TAKEN else row
-            node = {name: row[name] for name in _NODE} | {name: state[name] for name in _STATE}
+            node |= dict.fromkeys(_STATE) if row["kind"] == NOT_TAKEN else {}
             found.setdefault((row["kind"], row["id"]), node)
         return found
 

@@ -114,11 +114,11 @@ called AS (
         AND callback_instance_id IN (SELECT id FROM step WHERE kind = 'callback_instance')
     GROUP BY callback_instance_id
 )
-SELECT s.run_id, s.depth, s.from_kind, s.from_id, s.link_kind, s.wait_ns, s.candidate_count,
-    s.is_loss_affected, s.kind, s.id, s.start_ns, s.end_ns, s.node, s.label, s.topic_name,
-    s.symbol, s.thread, s.host, s.missing, s.reason, s.cut_count, s.internal_count,
-    w.busy_min_ns, w.busy_max_ns, u.until_ns, v.user_events,
-    o.published AS otherwise_published, k.stored_ns, y.calls
+SELECT s.run_id, s.kind, s.id, s.depth, s.start_ns, s.end_ns, s.node, s.label, s.topic_name,
+    s.symbol, s.thread, s.host, w.busy_min_ns, w.busy_max_ns, u.until_ns, v.user_events,
+    o.published AS otherwise_published, y.calls, s.missing, s.reason, s.cut_count,
+    s.internal_count, s.from_kind, s.from_id, s.link_kind, s.wait_ns, k.stored_ns,
+    s.candidate_count, s.is_loss_affected
 FROM step AS s
 LEFT JOIN (
     SELECT callback_instance_id, busy_min_ns, busy_max_ns
