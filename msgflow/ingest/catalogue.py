@@ -26,6 +26,8 @@ COMMON_COLUMNS = (
 )
 """First columns of every staging table; those of kernel events have no thread."""
 
+# For readers of the file alone: what an event means, and which versions of tracetools have it.
+_WORDS = ("description", "since", "until", "where")
 _FILE = Path(__file__).with_name("tracepoints.toml")
 
 
@@ -36,9 +38,6 @@ class Field:
     name: str  # the column, and the name in most traces
     type: str  # DuckDB's type of the column
     aliases: tuple[str, ...] = ()  # other names in traces
-    since: str | None = None  # first version of tracetools that has it, None if as old as the event
-    until: str | None = None  # last version of tracetools that has it, None if it is still there
-    where: str | None = None  # other places that have it, None if there are no others
 
 
 class Origin(Enum):
@@ -56,11 +55,6 @@ class CpuRole(Enum):
     WAKING = "waking"
     BEGIN = "begin"
     END = "end"
-
-
-def enum_type(values: Iterable[str]) -> str:
-    """Return DuckDB's type of a column that holds some of these texts: a byte each, not a text."""
-    return f"ENUM({', '.join(repr(value) for value in values)})"
 
 
 @dataclass(frozen=True)
@@ -81,16 +75,12 @@ class Tracepoint:
     """An event."""
 
     name: str  # provider and event, such as 'ros2:rcl_publish'
-    description: str  # one sentence
     fields: tuple[Field, ...]  # its payload, over all versions
     aliases: tuple[str, ...] = ()  # other names that it has in traces
     sequences: tuple[str, ...] = ()  # sequences of its thread that the event belongs to
     predecessors: tuple[Predecessor, ...] = ()  # columns about the events before it
     # The name that columns of its successors show, None if no column shows it.
     label: str | None = None
-    since: str | None = None  # first version of tracetools that has it, None for other providers
-    until: str | None = None  # last version of tracetools that has it, None if it is still there
-    where: str | None = None  # other places that have it, None if there are no others
     # The kernel emits it: it has no provider, and nothing to do with the thread that it
     # interrupted.
     is_kernel: bool = False
@@ -134,40 +124,30 @@ class Tracepoint:
             ]
         )
 
-    def columns(
-        self, labels: Iterable[str], interrupts: Iterable[str]
-    ) -> tuple[tuple[str, str], ...]:
-        """Return (name, DuckDB's type) of the columns of the staging table."""
-        types = {
-            Origin.EVENT_ID: "BIGINT",
-            Origin.TS_NS: "BIGINT",
-            Origin.LABEL: enum_type(labels),
-        }
+    def create_table_sql(self, catalog: str, known: Catalogue) -> str:
+        """Return the statement that creates the staging table in this catalog or schema."""
         # Since when the thread had the CPU that leaves it (NULL: not known), and the number of the
         # switch there; the latest switch, and the interrupt that is handled.
         of_cpu = {
             CpuRole.SWITCH: (("run_start_ns", "BIGINT"), ("switch_number", "BIGINT")),
-            CpuRole.WAKING: (("switch_event_id", "BIGINT"), ("interrupt", enum_type(interrupts))),
+            CpuRole.WAKING: (
+                ("switch_event_id", "BIGINT"),
+                ("interrupt", _enum_type(known.interrupts)),
+            ),
         }
-        return (
+        label = {Origin.LABEL: _enum_type(known.labels)}
+        columns = (
             *self.common_columns,
-            *((before.column, types[before.origin]) for before in self.predecessors),
+            *((before.column, label.get(before.origin, "BIGINT")) for before in self.predecessors),
             *(of_cpu.get(self.role, ()) if self.role else ()),
             *((field.name, field.type) for field in self.fields),
         )
-
-    def create_table_sql(
-        self, catalog: str, labels: Iterable[str], interrupts: Iterable[str]
-    ) -> str:
-        """Return the statement that creates the staging table in this catalog or schema."""
-        columns = self.columns(labels, interrupts)
         body = ",\n".join(f'    "{column}" {sql_type}' for column, sql_type in columns)
         return f'CREATE TABLE "{catalog}"."{self.table}" (\n{body}\n)'
 
 
 USER_EVENT = Tracepoint(
     name="user_event",
-    description="An event of the user's own programs, of any name.",
     fields=(Field("name", "VARCHAR"), Field("fields", "VARCHAR")),
     predecessors=(Predecessor("call", Origin.EVENT_ID),),
 )
@@ -235,14 +215,19 @@ def load() -> Catalogue:
 
 def _tracepoint(entry: dict[str, Any]) -> Tracepoint:
     fields = tuple(
-        Field(**{**field, "aliases": tuple(field.get("aliases", ()))}) for field in entry["fields"]
+        Field(**{**_without_words(field), "aliases": tuple(field.get("aliases", ()))})
+        for field in entry["fields"]
     )
     pairs = (text.split(".") for text in entry.get("predecessors", ()))
     predecessors = tuple(Predecessor(sequence, Origin(origin)) for sequence, origin in pairs)
     tuples = {name: tuple(entry.get(name, ())) for name in ("aliases", "sequences")}
     role = CpuRole(entry["role"]) if "role" in entry else None
     given = {"fields": fields, "predecessors": predecessors, "role": role}
-    return Tracepoint(**{**entry, **tuples, **given})
+    return Tracepoint(**{**_without_words(entry), **tuples, **given})
+
+
+def _without_words(entry: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in entry.items() if name not in _WORDS}
 
 
 def _arrow_type(sql_type: str) -> pa.DataType:
@@ -257,3 +242,8 @@ def _arrow_type(sql_type: str) -> pa.DataType:
         "UTINYINT": pa.uint8(),
         "VARCHAR": pa.string(),
     }[sql_type]
+
+
+def _enum_type(values: Iterable[str]) -> str:
+    """Return DuckDB's type of a column that holds some of these texts: a byte each, not a text."""
+    return f"ENUM({', '.join(repr(value) for value in values)})"

@@ -46,7 +46,7 @@ def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
         con.execute(f"ATTACH {literal(path)} AS {name} (RECOVERY_MODE no_wal_writes)")
     catalogue = load()
     for each in catalogue.staged.values():
-        con.execute(each.create_table_sql("raw", catalogue.labels, catalogue.interrupts))
+        con.execute(each.create_table_sql("raw", catalogue))
     text = (resource_directory("schema") / "staging.sql").read_text(encoding="utf-8")
     # One by one: what looks at a statement before it runs, such as EXPLAIN, sees it.
     for statement in con.extract_statements(text):

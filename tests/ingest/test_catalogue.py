@@ -131,7 +131,7 @@ def test_tables_take_the_readers_batches() -> None:
     known = catalogue.load()
     sequences, cpus = Sequences(known, [0]), Cpus(known)
     for tracepoint in known.staged.values():
-        con.execute(tracepoint.create_table_sql("staging", known.labels, known.interrupts))
+        con.execute(tracepoint.create_table_sql("staging", known))
         schema = pa.schema([*COMMON_SCHEMA, *tracepoint.arrow_schema()])
         row = {"event_id": 1, "ts_ns": 2, "trace_index": 0, "vpid": 3, "vtid": 4}
         batch = pa.RecordBatch.from_pylist([row], schema)
