@@ -883,7 +883,7 @@ class Database:
             run: 'all', a name or an id; the latest run when None.
             only_several: leave out runs with one clock, where nothing can be wrong.
         """
-        from msgflow.query.clock_notes import clock_verdicts
+        from msgflow.query.notes import clock_verdicts
 
         runs = self._ask(Slice(run).runs)
         return self._ask(clock_verdicts, runs, only_several=only_several)

@@ -16,8 +16,8 @@ from rich.text import Text
 from rich.tree import Tree
 
 from msgflow.export.flow_layout import NOT_TAKEN, lay_out_flow, walk
-from msgflow.query.clock_notes import clock_notes
 from msgflow.query.flow import STEPS_PER_MESSAGE, read_steps, require_start
+from msgflow.query.notes import clock_notes
 from msgflow.run.window import format_epoch
 from msgflow.text.json_value import json_value
 from msgflow.text.values import format_cell, format_duration, short_symbol

@@ -12,12 +12,16 @@ import duckdb
 from msgflow.errors import UsageError
 from msgflow.files.resources import resource_directory
 from msgflow.query.catalogue import load_query
-from msgflow.query.clock_notes import clock_notes
 from msgflow.query.differences import STATISTICS, Differences
-from msgflow.query.doubt_notes import AMBIGUOUS, doubt_notes
 from msgflow.query.names import require_places
+from msgflow.query.notes import (
+    AMBIGUOUS,
+    clock_notes,
+    doubt_notes,
+    function_notes,
+    schedule_notes,
+)
 from msgflow.query.runner import bind, run_query
-from msgflow.query.schedule_notes import function_notes, schedule_notes
 from msgflow.query.selection import CUT_COLUMN
 from msgflow.query.several_runs import LEAST_RUNS, compare_sides
 from msgflow.result.query_result import QueryResult

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import re
-import shlex
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import duckdb
 
 from msgflow.errors import UsageError
-from msgflow.query.clock_notes import clock_notes, untraced_notes
-from msgflow.query.doubt_notes import doubt_notes
 from msgflow.query.names import PLACE_PARAMETERS, require_ids, require_names, require_places
+from msgflow.query.notes import empty_notes, outside, row_notes
 from msgflow.query.selection import (
     COUNTS,
     CUT_COLUMN,
     INTERNAL_COLUMN,
-    KINDS,
     PLACE,
     Selection,
     selected,
@@ -26,35 +23,21 @@ from msgflow.query.selection import (
 )
 from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import LATEST, Slice
-from msgflow.run.window import format_epoch
 from msgflow.sql.failure import first_line, query_errors
-from msgflow.sql.statement import RECORDED, internal_sql, may_have_rows, recorded
+from msgflow.sql.statement import RECORDED, may_have_rows, recorded
 from msgflow.sql.value import described_type, parse_text
 from msgflow.text.name_suggestions import did_you_mean
-from msgflow.text.values import ARROW, format_duration
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Mapping
 
     import pyarrow as pa
 
     from msgflow.run.choice import Run
-    from msgflow.run.window import Window
     from msgflow.sql.header import Header, Param
     from msgflow.sql.value import Value
 
 RESERVED = ("runs", "start_ns", "end_ns", *RECORDED)
-# By the note of a header: what has rows where that was recorded, and what to say where it was not.
-_LACKING = {
-    "kernel": (
-        "thread_state",
-        "the kernel was not traced: msgflow record --kernel, see docs/scheduling.md",
-    ),
-    "samples": (
-        "stack_sample",
-        "no functions were sampled: msgflow record --profile 99, see docs/functions.md",
-    ),
-}
 _COLUMN = re.compile(r'Referenced column "([^"]*)"')
 # Errors that a user's condition may cause: the queries themselves are tested.
 _OF_CONDITIONS = (
@@ -190,47 +173,12 @@ def run_query(
     table, missing, has_rows = shown_rows(table, internal=internal, on_hidden=_on_hidden)
     notes = [] if runs else ["the database holds no run yet"]
     if part.has_window:
-        notes += _outside(runs, window)
+        notes += outside(runs, window)
     notes += missing
     if runs and not has_rows:
-        untraced = _not_traced(connection, runs, header.note)
-        notes += untraced
-        narrowing = _narrowing(own, selection)
-        if narrowing and not untraced:
-            why = _missing_way(connection, runs, own) or "try with less"
-            notes.append(f"nothing fits {' '.join(narrowing)}: {why}")
-    notes += doubt_notes(connection, runs, table)
-    if header.note in {"clocks", "requests", "samples"} and table.num_rows:
-        notes += clock_notes(connection, runs)
-        notes += untraced_notes(connection, runs, table)
-    if header.note == "callbacks":
-        notes += _without_callbacks(connection, runs)
+        notes += empty_notes(connection, runs, header.note, own, selection)
+    notes += row_notes(connection, runs, header.note, table)
     return QueryResult(table, header, runs, notes, order=sorted_by(header, selection))
-
-
-def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[str]:
-    """Return the options that leave rows out, as a user types them."""
-    given: dict[str, Any] = {name: parameters.get(name) or () for name in ("from", "to")}
-    given |= {name: getattr(selection, name) for name in (*KINDS, "via", "without")}
-    given["where"] = (selection.where,) if selection.where else ()
-    return [
-        # It may come from a number, which is no longer known.
-        "this path" if name == "via" and ARROW in each else f"--{name} {shlex.quote(each)}"
-        for name, texts in given.items()
-        for each in texts
-    ]
-
-
-def _missing_way(
-    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], parameters: Mapping[str, Value]
-) -> str | None:
-    """Return why no path leads from one place to another, if both are given and none does."""
-    places: dict[str, Any] = {name: parameters.get(name) for name in ("from", "to")}
-    if not all(places.values()):
-        return None
-    chosen = {"runs": [run.run_id for run in runs], **places}
-    found = internal_sql().run(connection, "missing_way", chosen).fetchall()
-    return str(found[0][0]) if found else None
 
 
 def bind(
@@ -288,64 +236,6 @@ def _checked(command: str, param: Param, value: Value) -> Value:
             f"{command} {option} {param.minimum}",
         )
     return value
-
-
-def _outside(runs: Sequence[Run], window: Window) -> list[str]:
-    """Return a note if the runs have nothing in the time window."""
-    seen = [
-        (run.start_ns, run.end_ns)
-        for run in runs
-        if run.start_ns is not None and run.end_ns is not None
-    ]
-    if any(first < window.end_ns and last >= window.start_ns for first, last in seen):
-        return []
-    if len(runs) > 1:
-        return ["none of the runs has anything in this time window"]
-    nothing = "the run has nothing in this time window"
-    if not seen:
-        return [nothing]
-    ((first, last),) = seen
-    return [f"{nothing}: it lasts {format_duration(last - first)}, from {format_epoch(first)}"]
-
-
-def _not_traced(
-    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], note: str | None
-) -> list[str]:
-    """Return notes on missing events, if the rows would have come from them."""
-    if note in {"requests", "goals"}:
-        # Other events of a run may show that this layer was not traced.
-        rows = connection.execute(
-            "SELECT run_id, detail FROM main.finding WHERE list_contains($runs, run_id) "
-            "AND name = 'missing_layer' AND subject = $layer ORDER BY run_id",
-            {"runs": [run.run_id for run in runs], "layer": note},
-        ).fetchall()
-        titles = {run.run_id: "" if len(runs) == 1 else f"run {run.title}: " for run in runs}
-        return [f"{titles[run_id]}{detail}" for run_id, detail in rows]
-    if note not in _LACKING:
-        return []
-    view, lacking = _LACKING[note]
-    found = connection.execute(
-        f"SELECT 1 FROM main.{view} WHERE list_contains(?, run_id) LIMIT 1",
-        [[run.run_id for run in runs]],
-    )
-    return [] if found.fetchall() else [lacking]
-
-
-def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
-    """Return a note that names the processes of which no callbacks are known, if there are any."""
-    rows = connection.execute(
-        "SELECT DISTINCT subject FROM main.finding "
-        "WHERE list_contains($runs, run_id) AND name = 'process_without_rclcpp' ORDER BY subject",
-        {"runs": [run.run_id for run in runs]},
-    ).fetchall()
-    if not rows:
-        return []
-    names = ", ".join(subject for (subject,) in rows)
-    what = "process records" if len(rows) == 1 else "processes record"
-    return [
-        f"{len(rows)} {what} no callbacks, without rclcpp (as those of rclpy): {names};"
-        " msgflow query path-breakdown has their times from take to publication"
-    ]
 
 
 def shown_rows(

@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import load_query
-from msgflow.query.doubt_notes import AMBIGUOUS
+from msgflow.query.notes import AMBIGUOUS
 from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection, conditions_of
 from msgflow.result.query_result import QueryResult

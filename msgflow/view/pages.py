@@ -13,8 +13,8 @@ import pyarrow as pa
 from msgflow.db.finding import read_findings
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
-from msgflow.query.clock_notes import clock_notes
 from msgflow.query.compare import compare, warm_up
+from msgflow.query.notes import clock_notes
 from msgflow.query.runner import Steps, bind, run_query
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window

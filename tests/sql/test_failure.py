@@ -128,7 +128,7 @@ def test_damage_is_said_by_all_that_meet_it(ingested: Path, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("place", "ask"),
     [
-        ("query.clock_notes.clock_verdicts", lambda database, _: database.clock_verdicts()),
+        ("query.notes.clock_verdicts", lambda database, _: database.clock_verdicts()),
         ("view.report.write_report", lambda database, _: database.report("x.html")),
         ("view.flow_page.write_flow_page", lambda database, flow: database.flow_page(flow, "x")),
     ],

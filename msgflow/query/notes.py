@@ -1,0 +1,285 @@
+"""Notes: what the rows of a query or a comparison do not show, a sentence each."""
+
+from __future__ import annotations
+
+import shlex
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+from msgflow.query.selection import KINDS
+from msgflow.run.window import format_epoch
+from msgflow.sql.statement import internal_sql, registered
+from msgflow.text.values import ARROW, format_duration
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    import duckdb
+    import pyarrow as pa
+
+    from msgflow.query.selection import Selection
+    from msgflow.result.query_result import QueryResult
+    from msgflow.run.choice import Run
+    from msgflow.run.window import Window
+    from msgflow.sql.value import Value
+
+# By the note of a header: what has rows where that was recorded, and what to say where it was not.
+_LACKING = {
+    "kernel": (
+        "thread_state",
+        "the kernel was not traced: msgflow record --kernel, see docs/scheduling.md",
+    ),
+    "samples": (
+        "stack_sample",
+        "no functions were sampled: msgflow record --profile 99, see docs/functions.md",
+    ),
+}
+# How many values of a row pass such a link, or whether its flow does.
+AMBIGUOUS = "ambiguous"
+_MARKS = (AMBIGUOUS, "is_ambiguous")
+# What has the nodes: a path, or in a verification what was measured.
+_WAYS = ("path", "subject")
+_FOUND = """
+SELECT subject, detail, cure
+FROM main.finding
+WHERE list_contains($runs, run_id) AND name IN ('ambiguous_cause', 'ambiguous_link')
+ORDER BY name, run_id, subject
+"""
+_MOST = 3
+_SAMPLED = "SELECT count(DISTINCT run_id) FROM main.stack_sample WHERE run_id IN ($run_a, $run_b)"
+_ASKED = ("run_a", "run_b", "skip_first", "a_window", "b_window")
+_PARTS = {
+    "running_ns": "CPU time",
+    "queue_ns": "waiting for a CPU",
+    "blocked_ns": "sleeping or blocked",
+}
+
+
+def outside(runs: Sequence[Run], window: Window) -> list[str]:
+    """Return a note if the runs have nothing in the time window."""
+    seen = [
+        (run.start_ns, run.end_ns)
+        for run in runs
+        if run.start_ns is not None and run.end_ns is not None
+    ]
+    if any(first < window.end_ns and last >= window.start_ns for first, last in seen):
+        return []
+    if len(runs) > 1:
+        return ["none of the runs has anything in this time window"]
+    nothing = "the run has nothing in this time window"
+    if not seen:
+        return [nothing]
+    ((first, last),) = seen
+    return [f"{nothing}: it lasts {format_duration(last - first)}, from {format_epoch(first)}"]
+
+
+def empty_notes(
+    connection: duckdb.DuckDBPyConnection,
+    runs: Sequence[Run],
+    note: str | None,
+    parameters: Mapping[str, Value],
+    selection: Selection,
+) -> list[str]:
+    """Return why a query whose header has this note has no rows."""
+    untraced = _not_traced(connection, runs, note)
+    narrowing = _narrowing(parameters, selection)
+    if untraced or not narrowing:
+        return untraced
+    why = _missing_way(connection, runs, parameters) or "try with less"
+    return [f"nothing fits {' '.join(narrowing)}: {why}"]
+
+
+def row_notes(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], note: str | None, table: pa.Table
+) -> list[str]:
+    """Return what the rows of a query whose header has this note do not show."""
+    notes = doubt_notes(connection, runs, table)
+    if note in {"clocks", "requests", "samples"} and table.num_rows:
+        notes += clock_notes(connection, runs)
+        notes += _untraced_notes(connection, runs, table)
+    if note == "callbacks":
+        notes += _without_callbacks(connection, runs)
+    return notes
+
+
+def _not_traced(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], note: str | None
+) -> list[str]:
+    """Return notes on missing events, if the rows would have come from them."""
+    if note in {"requests", "goals"}:
+        # Other events of a run may show that this layer was not traced.
+        rows = connection.execute(
+            "SELECT run_id, detail FROM main.finding WHERE list_contains($runs, run_id) "
+            "AND name = 'missing_layer' AND subject = $layer ORDER BY run_id",
+            {"runs": [run.run_id for run in runs], "layer": note},
+        ).fetchall()
+        titles = {run.run_id: "" if len(runs) == 1 else f"run {run.title}: " for run in runs}
+        return [f"{titles[run_id]}{detail}" for run_id, detail in rows]
+    if note not in _LACKING:
+        return []
+    view, lacking = _LACKING[note]
+    found = connection.execute(
+        f"SELECT 1 FROM main.{view} WHERE list_contains(?, run_id) LIMIT 1",
+        [[run.run_id for run in runs]],
+    )
+    return [] if found.fetchall() else [lacking]
+
+
+def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
+    """Return a note that names the processes of which no callbacks are known, if there are any."""
+    rows = connection.execute(
+        "SELECT DISTINCT subject FROM main.finding "
+        "WHERE list_contains($runs, run_id) AND name = 'process_without_rclcpp' ORDER BY subject",
+        {"runs": [run.run_id for run in runs]},
+    ).fetchall()
+    if not rows:
+        return []
+    names = ", ".join(subject for (subject,) in rows)
+    what = "process records" if len(rows) == 1 else "processes record"
+    return [
+        f"{len(rows)} {what} no callbacks, without rclcpp (as those of rclpy): {names};"
+        " msgflow query path-breakdown has their times from take to publication"
+    ]
+
+
+def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[str]:
+    """Return the options that leave rows out, as a user types them."""
+    given: dict[str, Any] = {name: parameters.get(name) or () for name in ("from", "to")}
+    given |= {name: getattr(selection, name) for name in (*KINDS, "via", "without")}
+    given["where"] = (selection.where,) if selection.where else ()
+    return [
+        # It may come from a number, which is no longer known.
+        "this path" if name == "via" and ARROW in each else f"--{name} {shlex.quote(each)}"
+        for name, texts in given.items()
+        for each in texts
+    ]
+
+
+def _missing_way(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], parameters: Mapping[str, Value]
+) -> str | None:
+    """Return why no path leads from one place to another, if both are given and none does."""
+    places: dict[str, Any] = {name: parameters.get(name) for name in ("from", "to")}
+    if not all(places.values()):
+        return None
+    chosen = {"runs": [run.run_id for run in runs], **places}
+    found = internal_sql().run(connection, "missing_way", chosen).fetchall()
+    return str(found[0][0]) if found else None
+
+
+def clock_notes(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
+    """Return notes on how far times of several hosts can be compared, a sentence each."""
+    chosen = {"runs": [run.run_id for run in runs]}
+    # Most runs have one clock and need no note: this first statement takes no time.
+    several = connection.execute(
+        "SELECT 1 FROM main.clock WHERE list_contains($runs, run_id) "
+        "GROUP BY run_id HAVING count(*) > 1 LIMIT 1",
+        chosen,
+    )
+    if not several.fetchall():
+        return []
+    return _sentences(connection, "clock_note", chosen)
+
+
+def _untraced_notes(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], table: pa.Table
+) -> list[str]:
+    """Return where flows begin whose first publisher is not traced, if paths have any."""
+    if "path" not in table.column_names:
+        return []
+    chosen = {"runs": [run.run_id for run in runs]}
+    begins = internal_sql().run(connection, "untraced_begin", chosen).fetchall()
+    if not begins:
+        return []
+    paths = [path for path in table["path"].unique().to_pylist() if path is not None]
+    where = {
+        True: "the stamp of each message",
+        False: "its take: its clock may be another one",
+        None: "the stamp of each message, or its take where its clock may be another one",
+    }
+    return [
+        f"what publishes {topic} is not traced: flows begin with {where[is_stamped]}"
+        for topic, is_stamped in begins
+        if any(path.startswith(f"(not traced) → {topic} → ") for path in paths)
+    ]
+
+
+def clock_verdicts(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], *, only_several: bool = False
+) -> list[str]:
+    """Return a sentence per run, or per run with several clocks: whether times of hosts compare."""
+    chosen = {"runs": [run.run_id for run in runs], "only_several": only_several}
+    return _sentences(connection, "clock_verdict", chosen)
+
+
+def _sentences(
+    connection: duckdb.DuckDBPyConnection, name: str, chosen: Mapping[str, Any]
+) -> list[str]:
+    found = internal_sql().run(connection, name, chosen)
+    return [sentence for (sentence,) in found.fetchall()]
+
+
+def doubt_notes(
+    connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], table: pa.Table
+) -> list[str]:
+    """Return a sentence for each node at which flows of these rows pass a link that is in doubt."""
+    mark, way = (
+        next((name for name in names if name in table.column_names), None)
+        for names in (_MARKS, _WAYS)
+    )
+    if mark is None or way is None:
+        return []
+    with registered(connection, doubtful=table):
+        doubted = connection.execute(
+            f"SELECT DISTINCT {way} FROM doubtful WHERE {mark}::BOOLEAN"
+        ).fetchall()
+    if not doubted:
+        return []
+    places = {step for (steps,) in doubted if steps is not None for step in steps.split(" → ")}
+    found = connection.execute(_FOUND, {"runs": [run.run_id for run in runs]}).fetchall()
+    return [
+        f"{subject}: {detail}, and flows through it with them. {cure.rstrip('.')}"
+        for subject, detail, cure in found
+        if subject in places
+    ] or ["some flows pass a link that may be another one: candidate_count of the links"]
+
+
+def schedule_notes(
+    connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value], result: QueryResult
+) -> Iterator[str]:
+    """Yield a sentence for each of the callbacks that changed most, where the kernel was traced."""
+    rows = result.table.select(["subject", "verdict"]).to_pylist()
+    changed = {row["subject"] for row in rows if row["verdict"] in ("B is longer", "B is shorter")}
+    if not changed:
+        return
+    given = {name: asked[name] for name in _ASKED}
+    found = internal_sql().rows(connection, "callback_time", given | {"subjects": sorted(changed)})
+    for row in islice(found, _MOST):
+        yield f"{row['subject']}, on average {_change(row, 'duration_ns')}: {_parts(row)}"
+
+
+def function_notes(
+    connection: duckdb.DuckDBPyConnection, asked: Mapping[str, Value]
+) -> Iterator[str]:
+    """Yield a sentence for each function that changed most, where both runs have samples."""
+    runs = {name: asked[name] for name in ("run_a", "run_b")}
+    ((sampled,),) = connection.execute(_SAMPLED, runs).fetchall()
+    if sampled < len({*runs.values()}):
+        return
+    given = {name: asked[name] for name in (*_ASKED, "at_least")}
+    for row in islice(internal_sql().rows(connection, "changed_function", given), _MOST):
+        a, b = (format_duration(row[name]) for name in ("a_ns", "b_ns"))
+        yield (
+            f"{row['node']} · {row['callback']}: CPU time per call in {row['function']} {a} → {b}"
+            f" ({row['a_samples']:,} and {row['b_samples']:,} samples)"
+        )
+
+
+def _parts(row: Mapping[str, Any]) -> str:
+    parts = sorted(_PARTS, key=lambda name: -abs(row[name]))
+    return ", ".join(f"{_change(row, name)} {_PARTS[name]}" for name in parts if row[name])
+
+
+def _change(row: Mapping[str, Any], name: str) -> str:
+    value = row[name]
+    return f"{format_duration(abs(value))} {'more' if value >= 0 else 'less'}"
