@@ -913,7 +913,7 @@ class Database:
         Raises:
             UsageError: a view, run or time that does not exist, or a file that does.
         """
-        from msgflow.export.parquet import export_parquet
+        from msgflow.export.view_files import export_parquet
 
         return self._export(export_parquet, output, views, Slice(run, **times), force)
 
@@ -941,7 +941,7 @@ class Database:
         Raises:
             UsageError: a view, run or time that does not exist, or a file that does.
         """
-        from msgflow.export.csv_files import export_csv
+        from msgflow.export.view_files import export_csv
 
         return self._export(export_csv, output, views, Slice(run, **times), force)
 

@@ -11,7 +11,7 @@ from msgflow.errors import UsageError
 from msgflow.text.json_value import json_text, json_value
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
     from pathlib import Path
 
     import pyarrow as pa
@@ -69,7 +69,8 @@ def by_suffix(path: Path, known: Mapping[str, Form], more: str = "") -> Form:
 def write_result(result: QueryResult, form: Format, stream: IO[bytes]) -> None:
     """Write `result` to a binary stream, text as UTF-8."""
     if form in (Format.CSV, Format.CSV_SAFE):
-        _write_csv(result.table, stream, is_safe=form is Format.CSV_SAFE)
+        batches = result.table.to_batches(max_chunksize=_ROWS_AT_ONCE)
+        write_csv(result.table.schema, batches, stream, is_safe=form is Format.CSV_SAFE)
     elif form is Format.PARQUET:
         import pyarrow.parquet
 
@@ -104,7 +105,24 @@ def _json_array(result: QueryResult) -> Iterator[str]:
         before = " "
 
 
-def csv_batch(batch: pa.RecordBatch) -> pa.RecordBatch:
+def write_csv(
+    schema: pa.Schema, batches: Iterable[pa.RecordBatch], target: Path | IO[bytes], *, is_safe: bool
+) -> int:
+    """Write batches as CSV, and return how many rows; `is_safe`: without formulas."""
+    import pyarrow.csv
+
+    from msgflow.trace.numpy_arrow import empty_batch
+
+    prepared = _without_formulas if is_safe else _csv_batch
+    count = 0
+    with pyarrow.csv.CSVWriter(target, prepared(empty_batch(schema)).schema) as writer:
+        for batch in batches:
+            writer.write_batch(prepared(batch))
+            count += batch.num_rows
+    return count
+
+
+def _csv_batch(batch: pa.RecordBatch) -> pa.RecordBatch:
     """Return a batch for CSV: integers, floats and truth values stay, all else becomes text.
 
     Text gets quotes, NULL does not: an empty text and a missing one stay different.
@@ -115,17 +133,6 @@ def csv_batch(batch: pa.RecordBatch) -> pa.RecordBatch:
     return pyarrow.RecordBatch.from_arrays(columns, names=batch.schema.names)
 
 
-def _write_csv(table: pa.Table, stream: IO[bytes], *, is_safe: bool) -> None:
-    import pyarrow.csv
-
-    from msgflow.trace.numpy_arrow import empty_batch
-
-    prepared = _without_formulas if is_safe else csv_batch
-    with pyarrow.csv.CSVWriter(stream, prepared(empty_batch(table.schema)).schema) as writer:
-        for batch in table.to_batches(max_chunksize=_ROWS_AT_ONCE):
-            writer.write_batch(prepared(batch))
-
-
 def _without_formulas(batch: pa.RecordBatch) -> pa.RecordBatch:
     import pyarrow as pa
     import pyarrow.compute as pc
@@ -133,7 +140,7 @@ def _without_formulas(batch: pa.RecordBatch) -> pa.RecordBatch:
     def safe(texts: pa.Array) -> pa.Array:
         return pc.replace_substring_regex(texts, r"^([=+\-@\t\r])", r"'\1")
 
-    batch = csv_batch(batch)
+    batch = _csv_batch(batch)
     columns = [safe(each) if pa.types.is_string(each.type) else each for each in batch.columns]
     names = safe(pa.array(batch.schema.names, pa.string())).to_pylist()
     return pa.RecordBatch.from_arrays(columns, names=names)

@@ -14,7 +14,7 @@ from msgflow.fleet.lake_connection import Reading, choose, lake_errors
 from msgflow.fleet.lake_query import fleet_query, header_of, statements
 from msgflow.fleet.listing import list_failures
 from msgflow.text.shell import shell_quoted
-from msgflow.view.single_page import Parts, single_page
+from msgflow.view.assets import Parts, single_page
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Files of the front end: modules, style sheets and libraries, and one file of all of them.
+"""Files of the front end: modules, style sheets and libraries, and one page of all of them.
 
 The modules use what every browser has, so nothing builds them. A report has them in one script:
 each module after those that it imports, without the words `import` and `export`. So no name may
@@ -8,11 +8,15 @@ stand at the outermost level of two modules; a test checks that.
 from __future__ import annotations
 
 import base64
+import gzip
 import hashlib
+import json
 import re
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from string import Template
+from typing import Any
 
 STATIC = Path(__file__).parent / "static"
 VENDOR = Path(__file__).parent / "vendor"
@@ -25,6 +29,11 @@ IMPORTED = ("codemirror.min.js", "flamegraph.min.js")
 _IMPORT = re.compile(r'^import\s+\{[^}]*\}\s+from\s+"\./([\w-]+\.js)";\n', re.MULTILINE)
 _EXPORT = re.compile(r"^export (?=(?:async function|function|class|const|let)\b)", re.MULTILINE)
 _SOURCE_MAP = re.compile(r"^//# sourceMappingURL=.*$", re.MULTILINE)
+
+_POLICY = (
+    "default-src 'none'; script-src {scripts}; style-src {styles}; img-src data:;"
+    " base-uri 'none'; form-action 'none'"
+)
 
 
 @cache
@@ -71,3 +80,42 @@ def source_hash(content: str) -> str:
     """Return the name of an inline script or style sheet in a Content-Security-Policy."""
     digest = hashlib.sha256(content.encode()).digest()
     return f"'sha256-{base64.b64encode(digest).decode()}'"
+
+
+@dataclass
+class Parts:
+    """Data of a page: the answers to what it may ask, each under its question."""
+
+    keys: list[dict[str, Any]] = field(default_factory=list)
+    buffers: list[bytes] = field(default_factory=list)
+
+    def add(self, key: str, content: bytes) -> None:
+        """Keep the answer to a question."""
+        self.keys.append({"key": key, "length": len(content)})
+        self.buffers.append(content)
+
+    def pack(self, head: dict[str, Any]) -> bytes:
+        """Return all answers, compressed."""
+        text = json.dumps(head | {"parts": self.keys}, ensure_ascii=False).encode()
+        content = b"".join([len(text).to_bytes(4, "little"), text, *self.buffers])
+        return gzip.compress(content, compresslevel=6, mtime=0)
+
+
+def single_page(parts: Parts, head: dict[str, Any]) -> str:
+    """Return the page."""
+    packed = base64.b64encode(parts.pack(head)).decode()
+    scripts = [*(vendored(name) for name in SCRIPTS), joined()]
+    styles = [*(vendored(name) for name in SHEETS), text("style.css")]
+    policy = _POLICY.format(
+        scripts=" ".join(map(source_hash, scripts)),
+        styles=" ".join(map(source_hash, styles)),
+    )
+    # The browser runs scripts at the end of the page, behind the data.
+    body = [f'<script type="application/octet-stream" id="msgflow-data">{packed}</script>']
+    body += [f"<script>{script}</script>" for script in scripts[:-1]]
+    body.append(f'<script type="module">{scripts[-1]}</script>')
+    return page(
+        head="\n".join(f"<style>{style}</style>" for style in styles),
+        body="\n".join(body),
+        policy=policy,
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections import OrderedDict
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -20,7 +20,6 @@ from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.sql.statement import internal_sql
 from msgflow.text.shell import shell_joined
-from msgflow.view.critical_path import critical_path
 from msgflow.view.page_query import Scratch, page_query, run_page_query
 from msgflow.view.question import Params, Question
 from msgflow.view.sql_page import examples, words
@@ -42,6 +41,7 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.result.query_result import QueryResult
+    from msgflow.sql.value import Value
 
 # Named queries that pages show, with the numbers of `msgflow query`.
 NAMED = (
@@ -272,6 +272,44 @@ def _compare(_: Pages, asked: Question) -> bytes:
         resamples=0 if is_quick else None,
     )  # fmt: skip
     return encoded_comparison(comparison, what, is_quick=is_quick)
+
+
+def critical_path(asked: Question) -> bytes:
+    """Return the pieces of the critical path as bytes, with the command that prints them.
+
+    It belongs to the longest flow that ends where the picked one does, see critical_end.sql. It
+    starts on the topic `from`, or without it on the topic of its first message.
+    """
+    picked: dict[str, Value] = {"kind": asked.kind, "id": asked.whole("id")}
+    ends = run_page_query(asked.connection, "critical_end", picked).to_pylist()
+    if not ends:
+        return encode(pa.table({"at_ns": pa.array([], pa.int64())}))
+    (end,) = ends
+    first = str(asked.params.get("from") or end["from_topic"])
+    chosen: dict[str, Value] = {
+        "from": [first],
+        "to": [end["to_topic"]],
+        "take": end["take_id"],
+        # Whatever was picked has a flow, also one that is not the first arrival of its root.
+        "case": "every_pair",
+        "detail": "full",
+    }
+    header = load_query("critical-path")
+    result = run_query(asked.connection, header, chosen, Slice(asked.run.run_id))
+    command = ["msgflow", "flow", "--take", str(end["take_id"]), "--why"]
+    # The page shows the path itself.
+    shown = replace(
+        result,
+        table=result.table.drop_columns(["path"]),
+        header=replace(header, columns=tuple(c for c in header.columns if c.name != "path")),
+    )
+    meta = {
+        "from": first,
+        "to": end["to_topic"],
+        "take_id": end["take_id"],
+        "command": shell_joined([*command, "--from", first, "--detail", "full"]),
+    }
+    return encode_result(shown, meta, asked.origin_ns)
 
 
 def _links(_: Pages, asked: Question) -> bytes:

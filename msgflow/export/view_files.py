@@ -1,4 +1,4 @@
-"""Parquet files of public views, partitioned by run, with metadata that describe them."""
+"""Files of public views: Parquet, partitioned by run, with metadata that describe them; CSV."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import json
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
+from msgflow.export.formats import write_csv
 from msgflow.export.views import ExportedView, Selection
 from msgflow.files.atomic_directory import PARTITION_FILE, replacing_entries
 from msgflow.version import __version__
@@ -53,6 +54,23 @@ def export_parquet(
                         writer.write_batch(batch.select(names))
                         counts[view] += batch.num_rows
     return tuple(ExportedView(view, directory / view, count) for view, count in counts.items())
+
+
+def export_csv(
+    connection: duckdb.DuckDBPyConnection,
+    directory: Path,
+    selection: Selection,
+    *,
+    force: bool,
+) -> tuple[ExportedView, ...]:
+    """Write views to `directory/VIEW.csv`, all of them or none, rows sorted by all columns."""
+    names = {view: f"{view}.csv" for view in selection.views}
+    counts = dict.fromkeys(names, 0)
+    with replacing_entries(directory, list(names.values()), force=force) as aside:
+        for view, name in names.items():
+            with selection.read(connection, view, selection.runs) as reader:
+                counts[view] = write_csv(reader.schema, reader, aside / name, is_safe=False)
+    return tuple(ExportedView(view, directory / names[view], counts[view]) for view in names)
 
 
 def _pandas_types(schema: pa.Schema) -> str:
