@@ -71,8 +71,7 @@ def write_flow_page(
             f" (--depth {depth}, --limit {limit})."
         )
     parts = Parts()
-    runs = run_page_query(connection, "run", {})
-    parts.add("run", encode(runs.filter(compute.equal(runs["run_id"], run.run_id))))
+    parts.add("run", encode(run_page_query(connection, "run", {"run": run.run_id})))
     parts.add("row?", encode(rows.filter(compute.is_in(rows["row_key"], shown["row_key"]))))
     for name in ("gap", "thread_name"):
         parts.add(f"{name}?", pages.answer(connection, name, params))

@@ -23,7 +23,7 @@ from msgflow.text.values import format_duration
 from msgflow.view.assets import Parts, single_page
 from msgflow.view.page_query import run_page_query
 from msgflow.view.pages import LEVEL_BINS, NAMED, SUMMARY, Pages, named
-from msgflow.view.question import Params, Question
+from msgflow.view.question import Question
 from msgflow.view.summary import (
     change_section,
     encoded_comparison,
@@ -130,9 +130,11 @@ class _Maker:
     def answer(self, name: str, /, **params: Any) -> bytes:
         return self.pages.answer(self.asked.connection, name, self.asked.params | params)
 
-    def keep(self, name: str, /, **params: Any) -> None:
+    def keep(self, name: str, /, of: Run | None = None, **params: Any) -> None:
+        """Keep an answer, of the other run if one is given."""
         known = "&".join(sorted(f"{key}={value}" for key, value in params.items()))
-        self.parts.add(f"{name}?{known}", self.answer(name, **params))
+        place, run = ("", {}) if of is None else (f"@{of.run_id}", {"run": of.run_id})
+        self.parts.add(f"{name}?{known}{place}", self.answer(name, **params, **run))
 
     def make(self, compare: str | int | None) -> tuple[str, list[str]]:
         shown = self.shown_window()
@@ -169,10 +171,7 @@ class _Maker:
             self.paths_through(self.asked.rows("path"))
             self.notes.append(f"Its slowest paths are those with {self.through} (--through).")
         comparison = None if compare is None else self.compare_with(self.other_run(compare))
-        (row,) = [
-            row for row in run_page_query(self.asked.connection, "run", {}).to_pylist()
-            if row["run_id"] == run.run_id
-        ]  # fmt: skip
+        (row,) = run_page_query(self.asked.connection, "run", {"run": run.run_id}).to_pylist()
         facts = [
             format_duration(row["length"]),
             f"{row['event_count']:,} events",
@@ -238,9 +237,8 @@ class _Maker:
         return other
 
     def keep_runs(self, other: Run | None) -> None:
-        table = run_page_query(self.asked.connection, "run", {})
         wanted = [*([] if other is None else [other.run_id]), self.asked.run.run_id]
-        rows = [table.filter(compute.equal(table["run_id"], run_id)) for run_id in wanted]
+        rows = (run_page_query(self.asked.connection, "run", {"run": one}) for one in wanted)
         self.parts.add("run", encode(pa.concat_tables(rows)))
 
     def keep_paths(self) -> list[int]:
@@ -286,17 +284,11 @@ class _Maker:
         self.parts.add(f"compare?other={other.run_id}&what=paths", content)
         for what in ("callbacks", "topics"):
             self.keep("compare", other=other.run_id, what=what)
-        params: Params = {"run": other.run_id}
         for name in ("path", "row"):
-            self.parts.add(
-                f"{name}?@{other.run_id}", self.pages.answer(self.asked.connection, name, params)
-            )
-        rows = Question(self.asked.connection, params).rows("path")
+            self.keep(name, other)
+        rows = Question(self.asked.connection, {"run": other.run_id}).rows("path")
         for number in rows["path_id"].to_pylist()[:MOST_PATHS]:
-            self.parts.add(
-                f"path_share?path={number}@{other.run_id}",
-                self.pages.answer(self.asked.connection, "path_share", params | {"path": number}),
-            )
+            self.keep("path_share", other, path=number)
         # The page of the comparison shows the distributions of both runs for any path.
         for number in self.asked.rows("path")["path_id"].to_pylist()[:MOST_PATHS]:
             if number not in chosen:

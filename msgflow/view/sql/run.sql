@@ -1,4 +1,4 @@
--- description: The runs of the database, and how much of the timeline each has.
+-- description: The runs of the database, or one of them, and how much of the timeline each has.
 -- grain: one row per run
 -- column: run_id BIGINT  Identity of the run
 -- column: name VARCHAR  Its name
@@ -16,4 +16,5 @@ SELECT
     (SELECT count(*) FROM main.host AS h WHERE h.run_id = r.run_id) AS host_count,
     r.msgflow_version
 FROM main.run AS r
+WHERE $run IS NULL OR r.run_id = $run
 ORDER BY r.run_id
