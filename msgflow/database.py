@@ -437,8 +437,7 @@ class Database:
         """
         from msgflow.db.objects import public_names
         from msgflow.db.sql_guard import require_condition
-        from msgflow.query.names import names_in
-        from msgflow.query.path_numbers import with_path_numbers
+        from msgflow.query.names import names_in, with_path_numbers
         from msgflow.query.runner import run_query
         from msgflow.query.selection import PATH, columns_of, make_selection
 
@@ -1096,7 +1095,7 @@ def _words_of_path(
 ) -> dict[str, list[str]]:
     """Return the arguments of `query` that a path stands for."""
     from msgflow.paths.paths_file import read_paths
-    from msgflow.query.path_numbers import numbered_path
+    from msgflow.query.names import numbered_path
 
     runs = part.runs(connection)
     if name.isdecimal():

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING
 
 import duckdb
 
-from msgflow.db.lock_holder import lock_holder
 from msgflow.db.memory import limit_threads, set_memory_limit
-from msgflow.db.workspace import remove_abandoned_workspaces
+from msgflow.db.workspace import lock_holder, remove_abandoned_workspaces
 from msgflow.errors import DatabaseError, DatabaseInUseError, require_utf8
 from msgflow.files.temporary_owner import left_behind, mark
 from msgflow.sql.failure import in_words

@@ -12,10 +12,9 @@ import pyarrow as pa
 
 from msgflow.errors import UsageError
 from msgflow.fleet.lake_connection import Choice, Reading, choose
-from msgflow.query.compare import share_of
+from msgflow.query.compare import runs_compared, share_of
 from msgflow.query.differences import STATISTICS, Differences
 from msgflow.query.selection import CASES, CUT_COLUMN
-from msgflow.query.several_runs import compared
 from msgflow.text.name_suggestions import meant_or, nearest
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ def compare(
     wanted = pa.array([each.get(by) in sides for each in labels])
     with Reading(replace(choice, runs=choice.runs.filter(wanted)), _TABLES) as reading:
         reading.connection.register("sided", table)
-        result = compared(
+        result = runs_compared(
             reading.connection, case=case, confidence=confidence, at_least=share_of(at_least)
         )
     rows = result.to_arrow().to_pylist()

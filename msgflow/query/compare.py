@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cache
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 import duckdb
@@ -23,7 +24,6 @@ from msgflow.query.notes import (
 )
 from msgflow.query.runner import bind, run_query
 from msgflow.query.selection import CUT_COLUMN
-from msgflow.query.several_runs import LEAST_RUNS, compare_sides
 from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import Run, choose_one, choose_runs, read_runs
 from msgflow.run.slice import Slice
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from msgflow.sql.value import Value
 
 DEFAULT_RESAMPLES = 1_000
+# With fewer runs on one side and many on the other, intervals are too narrow: docs/fleet.md.
+LEAST_RUNS = 6
 _CUT = (
     "paths beyond the limits are left out; --max-paths and --max-depth raise them, --from and --to"
     " choose"
@@ -180,7 +182,7 @@ def _several(
         )
     asked = asked | require_places(connection, [*sides[0], *sides[1]], asked)
     with query_errors("the comparison", "the comparison failed: {}"):
-        result = compare_sides(connection, asked, sides)
+        result = _sides_compared(connection, asked, sides)
     first, second = (side[0] for side in sides)
     result.notes.extend(_one_sided(result, "paths", *sides))
     for name, side in zip("AB", sides, strict=True):
@@ -198,6 +200,47 @@ def _several(
             " a_spread_percent and b_spread_percent of --wide say how much its runs differ"
         )
     return Comparison(result=result, run_a=first, run_b=second, skipped=asked["skip_first"])
+
+
+def runs_compared(
+    connection: duckdb.DuckDBPyConnection,
+    *,
+    case: str = "first",
+    confidence: float = 0.95,
+    at_least: float = 0.05,
+    name: str = "fleet compare",
+) -> QueryResult:
+    """Return the differences between two sides: it reads `flow`, `e2e_latency` and `sided`."""
+    measured = internal_sql().run(connection, "fleet_run_value", {"case": case}).to_arrow_table()
+    values = {
+        "z": NormalDist().inv_cdf((1 + confidence) / 2),
+        "least_units": LEAST_RUNS,
+        "at_least": at_least,
+    }
+    with registered(connection, measured=measured):
+        rows = internal_sql().run(connection, "fleet_comparison", values).to_arrow_table()
+    return QueryResult(rows, replace(internal_sql().header("fleet_comparison"), name=name))
+
+
+def _sides_compared(
+    connection: duckdb.DuckDBPyConnection, asked: dict[str, Any], sides: Sequence[Sequence[Run]]
+) -> QueryResult:
+    """Return how the paths of the runs of side B differ from those of side A."""
+    import pyarrow as pa
+
+    sided = [(str(run.run_id), side) for side, of in zip("ab", sides, strict=True) for run in of]
+    runs, names = ([row[place] for row in sided] for place in (0, 1))
+    asked = asked | {"runs": [int(run) for run in runs]}
+    flow = internal_sql().run(connection, "compared_flow", asked).to_arrow_table()
+    table = pa.table({"run": runs, "side": names, "unit": runs})
+    with registered(connection, flow=flow, e2e_latency=flow, sided=table):
+        return runs_compared(
+            connection,
+            case=asked["case"],
+            confidence=asked["confidence"],
+            at_least=asked["at_least"],
+            name="compare",
+        )
 
 
 def share_of(text: str) -> float:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.errors import NoFlowError
 from msgflow.query.catalogue import load_query
 from msgflow.query.compare import warm_up_seconds
-from msgflow.query.path_numbers import with_path_numbers
+from msgflow.query.names import with_path_numbers
 from msgflow.query.runner import Steps, run_query
 from msgflow.sql.statement import internal_sql, registered
 from msgflow.text.values import format_duration

@@ -11,9 +11,8 @@ from msgflow.files.atomic import replacing
 from msgflow.query.flow import STEPS_PER_MESSAGE
 from msgflow.run.window import Window
 from msgflow.view.assets import Parts, single_page
-from msgflow.view.page_query import run_page_query
+from msgflow.view.page_query import Params, Question, run_page_query
 from msgflow.view.pages import Pages, critical_path
-from msgflow.view.question import Params, Question
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:

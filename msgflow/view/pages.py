@@ -20,8 +20,7 @@ from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.sql.statement import internal_sql
 from msgflow.text.shell import shell_joined
-from msgflow.view.page_query import Scratch, page_query, run_page_query
-from msgflow.view.question import Params, Question
+from msgflow.view.page_query import Params, Question, Scratch, page_query, run_page_query
 from msgflow.view.sql_page import examples, words
 from msgflow.view.summary import (
     MOST_PATHS,

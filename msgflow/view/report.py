@@ -21,9 +21,8 @@ from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.text.values import format_duration
 from msgflow.view.assets import Parts, single_page
-from msgflow.view.page_query import run_page_query
+from msgflow.view.page_query import Question, run_page_query
 from msgflow.view.pages import LEVEL_BINS, NAMED, SUMMARY, Pages, named
-from msgflow.view.question import Question
 from msgflow.view.summary import (
     change_section,
     encoded_comparison,

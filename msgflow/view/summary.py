@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from msgflow.query.compare import Comparison
     from msgflow.sql.value import Value
     from msgflow.verify.verify import Verification
-    from msgflow.view.question import Question
+    from msgflow.view.page_query import Question
 
 # The slowest paths whose latency is taken apart.
 MOST_PATHS = 3

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from msgflow.db.lock_holder import lock_holder
+from msgflow.db.workspace import lock_holder
 
 HOLD = (
     "import fcntl, sys; file = open(sys.argv[1]); fcntl.{call}(file, fcntl.LOCK_{kind});"

@@ -18,7 +18,8 @@ from msgflow.errors import UsageError
 from msgflow.fleet.compare import compare
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import part_path
-from msgflow.query.several_runs import LEAST_RUNS, compared
+from msgflow.query.compare import LEAST_RUNS
+from msgflow.query.compare import runs_compared as compared
 from msgflow.sql.statement import internal_sql
 
 PATH = "/camera → /image → /control"

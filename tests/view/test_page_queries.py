@@ -14,9 +14,8 @@ from tables import decoded
 from thorough import thorough
 
 from msgflow.sql.statement import Statements
-from msgflow.view.page_query import DIRECTORY, page_query, run_page_query
+from msgflow.view.page_query import DIRECTORY, Question, page_query, run_page_query
 from msgflow.view.pages import LEVEL_BINS, Pages
-from msgflow.view.question import Question
 
 PAGES = Statements(DIRECTORY)
 NAMES = PAGES.names()

@@ -28,8 +28,8 @@ from msgflow.cli.sql_process import WarmSql
 from msgflow.errors import QueryError, UsageError
 from msgflow.view import pages
 from msgflow.view.connection import timed
+from msgflow.view.page_query import Question
 from msgflow.view.pages import Pages
-from msgflow.view.question import Question
 from msgflow.view.server import is_local, listen, running
 from msgflow.view.shared_database import Ahead, Turns
 

@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 from msgflow.cli.app import app
 from msgflow.database import open_db
 from msgflow.errors import UsageError
+from msgflow.view.page_query import Question
 from msgflow.view.pages import SUMMARY, Pages
-from msgflow.view.question import Question
 from msgflow.view.summary import Section, query_section
 
 Report = Callable[..., str]

@@ -12,7 +12,7 @@ what their `info` holds. Each `ForeignKey` declares a relation. Databases do not
 foreign keys would forbid replacing a run in one transaction. `relation_check.py` proves it instead.
 """
 
-from msgflow.db.tables import call, callback, identity, link, recording, ros_object, schedule
+from msgflow.db.tables import call, identity, link, recording, ros_object, schedule
 from msgflow.db.tables.column import STORE
 
-__all__ = ["STORE", "call", "callback", "identity", "link", "recording", "ros_object", "schedule"]
+__all__ = ["STORE", "call", "identity", "link", "recording", "ros_object", "schedule"]
