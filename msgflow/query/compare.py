@@ -35,6 +35,8 @@ from msgflow.sql.statement import internal_sql, registered
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+    import pyarrow as pa
+
     from msgflow.sql.value import Value
 
 DEFAULT_RESAMPLES = 1_000
@@ -44,16 +46,9 @@ _CUT = (
     "paths beyond the limits are left out; --max-paths and --max-depth raise them, --from and --to"
     " choose"
 )
-_UNITS = {"paths": "flows", "ends": "flows", "callbacks": "callback instances", "topics": "takes"}
 _OF_PARTS = ("from", "to", "case", "max_depth", "max_paths")
 # Warm-up is left out in steps of half a second.
 _STEP_NS = 500_000_000
-_LOST = """
-SELECT run_id, sum(discarded_event_count)::BIGINT
-FROM main.trace
-WHERE list_contains($runs, run_id)
-GROUP BY run_id
-"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,9 +183,8 @@ def _several(
     for name, side in zip("AB", sides, strict=True):
         of = f"{len(side)} runs" if len(side) > 1 else "1 run"
         result.notes.append(f"{name} is {of}: {', '.join(run.title for run in side)}")
-        doubted = result.table.select(["subject", f"{name.lower()}_{AMBIGUOUS}"])
-        doubted = doubted.rename_columns(["subject", AMBIGUOUS])
-        result.notes.extend(f"{name}: {note}" for note in doubt_notes(connection, side, doubted))
+        doubted = doubt_notes(connection, side, _ambiguous(result, name))
+        result.notes.extend(f"{name}: {note}" for note in doubted)
     if any(row[CUT_COLUMN] for row in result.to_arrow().to_pylist()):
         result.notes.append(_CUT)
     result.notes.extend(clock_notes(connection, [*sides[0], *sides[1]]))
@@ -307,7 +301,7 @@ def _compared(
         result.notes.extend(function_notes(connection, asked))
     if what == "callbacks":
         result.notes.extend(schedule_notes(connection, asked, result))
-    result.notes.extend(_doubts(connection, result, what, first, second))
+    result.notes.extend(_doubts(connection, result, asked))
     if len(result):
         result.notes.extend(clock_notes(connection, list(dict.fromkeys((first, second)))))
     return Comparison(result=result, run_a=first, run_b=second, skipped=asked["skip_first"])
@@ -374,35 +368,21 @@ def least_resamples(confidence: float) -> int:
 
 
 def _doubts(
-    connection: duckdb.DuckDBPyConnection, result: QueryResult, what: str, first: Run, second: Run
+    connection: duckdb.DuckDBPyConnection, result: QueryResult, asked: Mapping[str, Any]
 ) -> Iterable[str]:
     """Yield notes on limits, losses and verdicts: the numbers do not show these."""
-    rows = result.to_arrow().to_pylist()
-    if any(row[CUT_COLUMN] for row in rows):
-        yield _CUT
-    own = [row for row in rows if row["statistic"] == STATISTICS[0]]
-    lost = dict(connection.execute(_LOST, {"runs": [first.run_id, second.run_id]}).fetchall())
-    for side, run in (("a", first), ("b", second)):
-        affected = sum(row[f"{side}_loss_affected"] or 0 for row in own)
-        if affected or lost.get(run.run_id):
-            yield (
-                f"run {side.upper()}, {run.title}, lost {lost.get(run.run_id) or 0}"
-                f" events: {affected} of its {_UNITS[what]} have a gap in their time, others may be"
-                " missing altogether"
-            )
-        doubted = result.table.select(["subject", f"{side}_{AMBIGUOUS}"])
-        for note in doubt_notes(connection, [run], doubted.rename_columns(["subject", AMBIGUOUS])):
-            yield f"run {side.upper()}, {run.title}, {note}"
-    if any(row["verdict"] == "too few independent values" for row in rows):
-        yield (
-            "values that follow each other are alike, so that they count as few independent ones:"
-            " longer recordings tell more; a_independent and b_independent of --wide say how many"
-        )
-    if any(row["verdict"] in ("B is longer", "B is shorter") for row in rows):
-        yield (
-            "longer and shorter are said of these two recordings; the same system started again"
-            " differs, too"
-        )
+    with registered(connection, compared=result.table):
+        notes = internal_sql().run(connection, "comparison_note", asked).fetchall()
+    yield from (sentence for (sentence,) in notes)
+    for side, run in zip("AB", result.runs, strict=True):
+        for note in doubt_notes(connection, [run], _ambiguous(result, side)):
+            yield f"run {side}, {run.title}, {note}"
+
+
+def _ambiguous(result: QueryResult, side: str) -> pa.Table:
+    """Return which values of a side pass links that may be other ones."""
+    table = result.table.select(["subject", f"{side.lower()}_{AMBIGUOUS}"])
+    return table.rename_columns(["subject", AMBIGUOUS])
 
 
 def _one_sided(
