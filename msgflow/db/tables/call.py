@@ -53,7 +53,7 @@ table(
     moment(
         "next_event_ns",
         "Next event of the thread, where it has no stamp; NULL: none, or a gap may hide it",
-        hidden=True,
+        is_hidden=True,
     ),
     comment="One row per publish() call",
     view="Messages at the moment they were published, with the time of each layer seen.",

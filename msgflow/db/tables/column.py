@@ -50,25 +50,32 @@ def column(
     comment: str,
     type_: type[TypeEngine[Any]] | TypeEngine[Any],
     *,
-    unit: str | None = None,
     required: bool = False,
+    default: str | None = None,
     to: str | None = None,
-    **info: object,
+    **info: str | bool | None,
 ) -> Column[Any]:
-    """Return a column."""
+    """Return a column, whose default is an expression of SQL; `info` as above, None for nothing."""
+    unit = info.get("unit")
     return Column(
         name,
         type_,
         *([] if to is None else [ForeignKey(f"{STORE.schema}.{to}")]),
         nullable=not required,
+        server_default=None if default is None else expression(default),
         comment=comment if unit is None else f"{comment} [{unit}]",
-        info=info if unit is None else {"unit": unit, **info},
+        info={key: value for key, value in info.items() if value is not None},
     )
 
 
 text = partial(column, type_=VARCHAR)
 number = partial(column, type_=BIGINT)
 integer = partial(column, type_=INTEGER)  # of 32 bits
+flag = partial(column, type_=BOOLEAN, required=True, default="false")
+# A moment, as it was recorded. The public view shows it on the common time axis if it has a clock.
+moment = partial(number, unit="epoch ns")
+# A place in the total order of events.
+event_order = partial(number, unit="event order", is_hidden=True)
 # The key of a table of instances: unique, but not worth an index.
 identity = partial(number, required=True)
 
@@ -91,56 +98,11 @@ def trace_id(comment: str = "Trace it was recorded in", required: bool = True) -
     return reference("trace_id", comment, required=required)
 
 
-def process_id() -> Column[Any]:
-    """Return the process of a row."""
-    return reference("process_id", "Process it lives in", required=True)
-
-
 def thread_id(
     comment: str = "Thread it happened on", name: str = "thread_id", required: bool = True
 ) -> Column[Any]:
     """Return a thread of a row."""
     return reference(name, comment, to="thread", required=required)
-
-
-def node_id() -> Column[Any]:
-    """Return the node of an object."""
-    return reference("node_id", "Node it belongs to")
-
-
-def moment(
-    name: str,
-    comment: str,
-    *,
-    clock: str | None = None,
-    required: bool = False,
-    hidden: bool = False,
-) -> Column[Any]:
-    """Return a moment, as it was recorded.
-
-    The public view shows it on the common time axis if `clock` is given, else as it was recorded.
-    """
-    more: dict[str, Any] = {} if clock is None else {"clock": clock}
-    if hidden:
-        more["is_hidden"] = True
-    return number(name, comment, unit="epoch ns", required=required, **more)
-
-
-def event_order(name: str, comment: str) -> Column[Any]:
-    """Return a place in the total order of events, which public views do not show."""
-    return number(name, comment, unit="event order", is_hidden=True)
-
-
-def flag(name: str, comment: str, *, hidden: bool = False) -> Column[Any]:
-    """Return a truth value, false by default."""
-    return Column(
-        name,
-        BOOLEAN,
-        nullable=False,
-        server_default=expression("false"),
-        comment=comment,
-        info={"is_hidden": True} if hidden else {},
-    )
 
 
 def handle(name: str, comment: str) -> Column[Any]:
@@ -149,11 +111,13 @@ def handle(name: str, comment: str) -> Column[Any]:
     return column(name, meaning, UBigInteger)
 
 
-def route() -> Column[Any]:
-    """Return the services that a flow took on its way."""
-    return column(
-        "route",
-        "Node (or, negative, process) that called, then services; empty: by no service",
-        ARRAY(BIGINT),
-        required=True,
-    )
+process_id = partial(reference, "process_id", "Process it lives in", required=True)
+node_id = partial(reference, "node_id", "Node it belongs to")
+# The services that a flow took on its way.
+route = partial(
+    column,
+    "route",
+    "Node (or, negative, process) that called, then services; empty: by no service",
+    ARRAY(BIGINT),
+    required=True,
+)
