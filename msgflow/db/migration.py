@@ -95,13 +95,10 @@ def upgrade(path: Path) -> Upgrade:
 
 
 def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
-    if not has_current_views(con):
-        return False
-    try:
+    with contextlib.suppress(DatabaseError):
         require_ours(con, path)
-    except DatabaseError:
-        return False
-    return True
+        return has_current_views(con)
+    return False
 
 
 def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path) -> tuple[str, ...]:

@@ -132,10 +132,10 @@ class Tracepoint:
             CpuRole.SWITCH: (("run_start_ns", "BIGINT"), ("switch_number", "BIGINT")),
             CpuRole.WAKING: (
                 ("switch_event_id", "BIGINT"),
-                ("interrupt", _enum_type(known.interrupts)),
+                ("interrupt", enum_type(known.interrupts)),
             ),
         }
-        label = {Origin.LABEL: _enum_type(known.labels)}
+        label = {Origin.LABEL: enum_type(known.labels)}
         columns = (
             *self.common_columns,
             *((before.column, label.get(before.origin, "BIGINT")) for before in self.predecessors),
@@ -244,6 +244,6 @@ def _arrow_type(sql_type: str) -> pa.DataType:
     }[sql_type]
 
 
-def _enum_type(values: Iterable[str]) -> str:
+def enum_type(values: Iterable[str]) -> str:
     """Return DuckDB's type of a column that holds some of these texts: a byte each, not a text."""
     return f"ENUM({', '.join(repr(value) for value in values)})"
