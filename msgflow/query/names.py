@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.query.selection import PATH, values_of
+from msgflow.sql.statement import internal_sql
 from msgflow.text.name_suggestions import did_you_mean
 from msgflow.text.values import ARROW
 
@@ -29,33 +30,13 @@ VISITS = ("via", "without")
 # Steps of a path that name no place.
 _NAMELESS = ("?", "not traced")
 _SHOWN = 3
-_TOPICS = """
-SELECT topic_name AS name, is_internal FROM main.publisher WHERE list_contains($runs, run_id)
-UNION
-SELECT topic_name, is_internal FROM main.subscription WHERE list_contains($runs, run_id)
-"""
-_NODES = """
-SELECT full_name AS name, false AS is_internal FROM main.node WHERE list_contains($runs, run_id)
-UNION
-SELECT node, false FROM main.callback_label WHERE list_contains($runs, run_id)
-UNION
-SELECT main.node_label(NULL, name, pid), false FROM main.process
-WHERE list_contains($runs, run_id)
-"""
-_CALLBACKS = """
-SELECT label AS name, is_internal FROM main.callback_label WHERE list_contains($runs, run_id)
-"""
-_HOSTS = "SELECT hostname AS name, false FROM main.host WHERE list_contains($runs, run_id)"
-_SERVICES = """
-SELECT service_name AS name, is_internal FROM main.service WHERE list_contains($runs, run_id)
-"""
-# By kind of name: the names of a run, and the command that lists them.
-_KNOWN = {
-    "topic": (_TOPICS, "msgflow query topics"),
-    "node": (_NODES, "msgflow info --section nodes"),
-    "callback": (_CALLBACKS, "msgflow query callbacks"),
-    "host": (_HOSTS, "msgflow info --section hosts"),
-    "place": (f"{_TOPICS} UNION {_NODES} UNION {_SERVICES}", "msgflow graph --format table"),
+# By kind of name: the command that lists them. What a run has of them is `known_KIND`.
+_LISTED_BY = {
+    "topic": "msgflow query topics",
+    "node": "msgflow info --section nodes",
+    "callback": "msgflow query callbacks",
+    "host": "msgflow info --section hosts",
+    "place": "msgflow graph --format table",
 }
 _WORDS = {"place": "topic or node"}
 # Parameters that take an id, in every query: the view and column of it, and the command that lists
@@ -106,7 +87,7 @@ def names_in(
     if parts == (text,):
         return parts
     known = connection.execute(
-        f"SELECT 1 FROM ({_KNOWN[kind][0]}) AS known WHERE known.name = $name LIMIT 1",
+        f"SELECT 1 FROM ({internal_sql().text(f'known_{kind}')}) AS k WHERE k.name = $name LIMIT 1",
         {"runs": [run.run_id for run in runs], "name": text},
     ).fetchall()
     return (text,) if known else parts
@@ -125,7 +106,7 @@ def require_names(
         kind = "place"
     if not runs or not names:
         return
-    sql, source = _KNOWN[kind]
+    sql, source = internal_sql().text(f"known_{kind}"), _LISTED_BY[kind]
     values = {"runs": [run.run_id for run in runs]}
     missing = connection.execute(
         _MISSING.format(known=sql), values | {"patterns": list(names)}
