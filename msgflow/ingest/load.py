@@ -22,7 +22,7 @@ from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_numpy, without
 from msgflow.trace.prefetch import prefetched
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 
     import duckdb
 
@@ -75,9 +75,9 @@ def load_traces(
 
     tables = RawTables(con, may_hold=may_hold, may_replace=replace)
 
-    def read(corrections: Corrections | None) -> ImplausibleValues:
+    def read(corrections: Corrections | None) -> Counter[tuple[str, str, str]]:
         batches = traces.batches(wanted, progress=report)
-        implausible = ImplausibleValues()
+        implausible: Counter[tuple[str, str, str]] = Counter()
         sequences, cpus = Sequences(catalogue, _hosts(sources)), Cpus(catalogue)
         with transaction(con), con.cursor() as beside:
             # A thread reads the next round while DuckDB inserts this one.
@@ -111,7 +111,7 @@ def load_traces(
     _insert(con, "damage", damages)
     _insert(con, "ignored", matches(ignore, traces.event_counts))
     _insert(con, "asked", matches(events, traces.event_counts))
-    _insert(con, "implausible", implausible.rows())
+    _insert(con, "implausible", ((*key, count) for key, count in sorted(implausible.items())))
     if traces.duplicate_packet_count:
         _insert(con, "packet_read_once", [(None, traces.duplicate_packet_count)])
     _insert(con, "packet_read_once", traces.repeated_packet_counts.items())
@@ -138,7 +138,7 @@ def _placed(
     sequences: Sequences,
     cpus: Cpus,
     corrections: Corrections | None,
-    implausible: ImplausibleValues,
+    implausible: Counter[tuple[str, str, str]],
     beside: duckdb.DuckDBPyConnection,
 ) -> Generator[list[tuple[str, pa.RecordBatch]], None, None]:
     """Yield (table, rows) of all batches, round by round.
@@ -160,7 +160,7 @@ def _placed(
                 if tracepoint is USER_EVENT:
                     rows = user_rows(beside, batch.name, batch.batch)
                 else:
-                    rows = implausible.without(batch.name, batch.batch)
+                    rows = plausible(batch.name, batch.batch, implausible)
                 rows = rows if corrections is None else corrections.applied(rows)
                 if rows.num_rows:
                     events.append((tracepoint, rows))
@@ -216,35 +216,26 @@ def _hosts(sources: Sequence[Sequence[object]]) -> list[int]:
     return [numbers.setdefault((row[7], row[4]), len(numbers)) for row in sources]
 
 
-class ImplausibleValues:
-    """Payload values that cannot be times or names: NULL replaces them, and they are counted.
+def plausible(
+    name: str, batch: pa.RecordBatch, left_out: Counter[tuple[str, str, str]]
+) -> pa.RecordBatch:
+    """Return events of this name with NULL in place of values that cannot be times or names.
 
-    One of them must not end an ingest.
+    One of them must not end an ingest. `left_out` counts them by event, field and what is wrong.
     """
-
-    def __init__(self) -> None:
-        self._counts: Counter[tuple[str, str, str]] = Counter()
-
-    def without(self, name: str, batch: pa.RecordBatch) -> pa.RecordBatch:
-        """Return events of this name with NULL in place of implausible values."""
-        for place, field in enumerate(batch.schema):
-            values = batch.column(place)
-            if field.name in _TIMES:
-                what, numbers, least, most = "times", to_numpy(values), -_LATEST_NS, _LATEST_NS
-            elif pa.types.is_string(field.type):
-                what, numbers, least = "names: too long", text_lengths(values), 0
-                most = _LONGEST_SYMBOL if field.name == "symbol" else _LONGEST_NAME
-            else:
-                continue
-            if not numbers.size or (least <= numbers.min() and numbers.max() <= most):
-                continue
-            bad = is_valid(values) & ~((least <= numbers) & (numbers <= most))
-            if bad.any():
-                self._counts[name, field.name, what] += int(bad.sum())
-                batch = batch.set_column(place, field, without(values, bad))
-        return batch
-
-    def rows(self) -> Iterator[tuple[str, str, str, int]]:
-        """Yield (event, field, what its values cannot be, how many were left out)."""
-        for key, count in sorted(self._counts.items()):
-            yield *key, count
+    for place, field in enumerate(batch.schema):
+        values = batch.column(place)
+        if field.name in _TIMES:
+            what, numbers, least, most = "times", to_numpy(values), -_LATEST_NS, _LATEST_NS
+        elif pa.types.is_string(field.type):
+            what, numbers, least = "names: too long", text_lengths(values), 0
+            most = _LONGEST_SYMBOL if field.name == "symbol" else _LONGEST_NAME
+        else:
+            continue
+        if not numbers.size or (least <= numbers.min() and numbers.max() <= most):
+            continue
+        bad = is_valid(values) & ~((least <= numbers) & (numbers <= most))
+        if bad.any():
+            left_out[name, field.name, what] += int(bad.sum())
+            batch = batch.set_column(place, field, without(values, bad))
+    return batch
