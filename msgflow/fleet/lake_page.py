@@ -14,7 +14,7 @@ from msgflow.fleet.lake_connection import Reading, choose, lake_errors
 from msgflow.fleet.lake_query import fleet_query, header_of, statements
 from msgflow.fleet.listing import list_failures
 from msgflow.text.shell import shell_quoted
-from msgflow.view.assets import Parts, single_page
+from msgflow.view.assets import single_page
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
     notes = []
     if len(choice.runs) < choice.total:
         notes.append(f"{len(choice.runs):,} of {choice.total:,} runs: {where}")
-    parts = Parts()
+    parts: dict[str, bytes] = {}
     option = f"--lake {shell_quoted(lake.store.url)}"
     option += f" --where {shell_quoted(where)}" if where else ""
     with Reading(choice, ["flow"]) as reading, lake_errors(lake, is_query=True):
@@ -56,10 +56,10 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
         header = statements().header(name)
         units = {column.name: column.unit for column in header.columns if column.unit}
         meta = {"columns": {column.name: column.description for column in header.columns}}
-        parts.add(f"{name}?", encode(table, units=units, meta=meta))
+        parts[f"{name}?"] = encode(table, units=units, meta=meta)
     result = fleet_query(lake, _LATENCY, where=where)
     command = f"msgflow fleet query {_LATENCY} {option}"
-    parts.add("page_path?", _encoded(result, command))
+    parts["page_path?"] = _encoded(result, command)
     used = {key for pairs in choice.runs["labels"].to_pylist() for key, _ in pairs or ()}
     labels = sorted(used)[:MOST_LABELS]
     if len(used) > len(labels):
@@ -68,22 +68,19 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
         result = fleet_query(lake, _LATENCY, where=where, group_by=[label])
         column = result.columns[0]
         table = result.table.rename_columns(["value", *result.columns[1:]])
-        parts.add(
-            f"page_group?label={label}",
-            encode(
-                table,
-                units=result.units,
-                meta={"command": f"{command} --group-by {shell_quoted(column)}"},
-            ),
+        parts[f"page_group?label={label}"] = encode(
+            table,
+            units=result.units,
+            meta={"command": f"{command} --group-by {shell_quoted(column)}"},
         )
     wrong = {"where": "severity <> 'info'"}
     result = fleet_query(lake, _FINDINGS, where=where, selection=wrong)
     command = f"msgflow fleet query {header_of(_FINDINGS).words} {option}"
-    parts.add("page_finding?", _encoded(result, command))
+    parts["page_finding?"] = _encoded(result, command)
     failures = list_failures(lake).table
     failed = f"msgflow fleet failures --lake {shell_quoted(lake.store.url)}"
-    parts.add("page_failure?", encode(_with_time(failures), meta={"command": failed}))
-    parts.add("run", encode(_frame(lake, tables["page_run"])))
+    parts["page_failure?"] = encode(_with_time(failures), meta={"command": failed})
+    parts["run"] = encode(_frame(lake, tables["page_run"]))
     head: dict[str, Any] = {
         "notes": notes,
         "pages": ["lake"],

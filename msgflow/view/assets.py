@@ -12,11 +12,13 @@ import gzip
 import hashlib
 import json
 import re
-from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 STATIC = Path(__file__).parent / "static"
 VENDOR = Path(__file__).parent / "vendor"
@@ -82,28 +84,15 @@ def source_hash(content: str) -> str:
     return f"'sha256-{base64.b64encode(digest).decode()}'"
 
 
-@dataclass
-class Parts:
-    """Data of a page: the answers to what it may ask, each under its question."""
+def single_page(parts: Mapping[str, bytes], head: Mapping[str, Any]) -> str:
+    """Return a page with its data inside: one file that any browser opens, without a server.
 
-    keys: list[dict[str, Any]] = field(default_factory=list)
-    buffers: list[bytes] = field(default_factory=list)
-
-    def add(self, key: str, content: bytes) -> None:
-        """Keep the answer to a question."""
-        self.keys.append({"key": key, "length": len(content)})
-        self.buffers.append(content)
-
-    def pack(self, head: dict[str, Any]) -> bytes:
-        """Return all answers, compressed."""
-        text = json.dumps(head | {"parts": self.keys}, ensure_ascii=False).encode()
-        content = b"".join([len(text).to_bytes(4, "little"), text, *self.buffers])
-        return gzip.compress(content, compresslevel=6, mtime=0)
-
-
-def single_page(parts: Parts, head: dict[str, Any]) -> str:
-    """Return the page."""
-    packed = base64.b64encode(parts.pack(head)).decode()
+    `parts` are the answers to what it may ask, each under its question.
+    """
+    lengths = [{"key": key, "length": len(content)} for key, content in parts.items()]
+    text_of_head = json.dumps({**head, "parts": lengths}, ensure_ascii=False).encode()
+    content = b"".join([len(text_of_head).to_bytes(4, "little"), text_of_head, *parts.values()])
+    packed = base64.b64encode(gzip.compress(content, compresslevel=6, mtime=0)).decode()
     scripts = [*(vendored(name) for name in SCRIPTS), joined()]
     styles = [*(vendored(name) for name in SHEETS), text("style.css")]
     policy = _POLICY.format(

@@ -10,7 +10,7 @@ from pyarrow import compute
 from msgflow.files.atomic import replacing
 from msgflow.query.flow import STEPS_PER_MESSAGE
 from msgflow.run.window import Window
-from msgflow.view.assets import Parts, single_page
+from msgflow.view.assets import single_page
 from msgflow.view.page_query import Params, Question, run_page_query
 from msgflow.view.pages import Pages, critical_path
 from msgflow.view.table_encoding import encode
@@ -69,13 +69,13 @@ def write_flow_page(
             f"{bars.num_rows:,} of {count:,} vertices of the flow are here"
             f" (--depth {depth}, --limit {limit})."
         )
-    parts = Parts()
-    parts.add("run", encode(run_page_query(connection, "run", {"run": run.run_id})))
-    parts.add("row?", encode(rows.filter(compute.is_in(rows["row_key"], shown["row_key"]))))
+    parts: dict[str, bytes] = {}
+    parts["run"] = encode(run_page_query(connection, "run", {"run": run.run_id}))
+    parts["row?"] = encode(rows.filter(compute.is_in(rows["row_key"], shown["row_key"])))
     for name in ("gap", "thread_name"):
-        parts.add(f"{name}?", pages.answer(connection, name, params))
-    parts.add(f"critical?id={number}&kind={kind}", critical_path(asked))
-    parts.add("detail?place=0", encode(shown))
+        parts[f"{name}?"] = pages.answer(connection, name, params)
+    parts[f"critical?id={number}&kind={kind}"] = critical_path(asked)
+    parts["detail?place=0"] = encode(shown)
     # Arrows that lead to a bar of the flow, from a row of it.
     to_bars = links.filter(compute.is_in(links["from_row"], bars["row_key"])).join(
         bars.select(["row_key", "start_at"]).group_by(["row_key", "start_at"]).aggregate([]),
@@ -83,8 +83,8 @@ def write_flow_page(
         right_keys=["row_key", "start_at"],
         join_type="left semi",
     )
-    parts.add("links?place=0", encode(to_bars))
-    parts.add("edge?", encode(edges.rename_columns(["to_kind", "to_id", *edges.column_names[2:]])))
+    parts["links?place=0"] = encode(to_bars)
+    parts["edge?"] = encode(edges.rename_columns(["to_kind", "to_id", *edges.column_names[2:]]))
     pages.close()
     head = {
         "start": begin,

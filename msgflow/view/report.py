@@ -20,7 +20,7 @@ from msgflow.query.compare import compare as compare_runs
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.text.values import format_duration
-from msgflow.view.assets import Parts, single_page
+from msgflow.view.assets import single_page
 from msgflow.view.page_query import Question, run_page_query
 from msgflow.view.pages import LEVEL_BINS, NAMED, SUMMARY, Pages, named
 from msgflow.view.summary import (
@@ -123,7 +123,7 @@ class _Maker:
     through: str | None
     max_size: int
     notes: list[str] = field(default_factory=list)
-    parts: Parts = field(default_factory=Parts)
+    parts: dict[str, bytes] = field(default_factory=dict)
     named: dict[str, QueryResult] = field(default_factory=dict)
 
     def answer(self, name: str, /, **params: Any) -> bytes:
@@ -133,7 +133,7 @@ class _Maker:
         """Keep an answer, of the other run if one is given."""
         known = "&".join(sorted(f"{key}={value}" for key, value in params.items()))
         place, run = ("", {}) if of is None else (f"@{of.run_id}", {"run": of.run_id})
-        self.parts.add(f"{name}?{known}{place}", self.answer(name, **params, **run))
+        self.parts[f"{name}?{known}{place}"] = self.answer(name, **params, **run)
 
     def make(self, compare: str | int | None) -> tuple[str, list[str]]:
         shown = self.shown_window()
@@ -142,7 +142,7 @@ class _Maker:
         self.keep("finding")
         for name in NAMED:
             self.named[name], content = named(self.asked, name)
-            self.parts.add(f"query?name={name}", content)
+            self.parts[f"query?name={name}"] = content
         for name in (
             "row", "gap", "path", "executor_node", "executor_share", "callback", "loss",
             "loss_point", "thread_name",
@@ -157,7 +157,7 @@ class _Maker:
         sections = self.sections(comparison)
         for section in sections:
             content = encoded_section(section, self.asked.origin_ns)
-            self.parts.add(f"summary?part={section.name}", content)
+            self.parts[f"summary?part={section.name}"] = content
         names = [section.name for section in sections]
         said = {"summary": names, "absent": self.empty_pages(other)}
         head = self.keep_timeline(shown, chosen, said)
@@ -238,7 +238,7 @@ class _Maker:
     def keep_runs(self, other: Run | None) -> None:
         wanted = [*([] if other is None else [other.run_id]), self.asked.run.run_id]
         rows = (run_page_query(self.asked.connection, "run", {"run": one}) for one in wanted)
-        self.parts.add("run", encode(pa.concat_tables(rows)))
+        self.parts["run"] = encode(pa.concat_tables(rows))
 
     def keep_paths(self) -> list[int]:
         """Keep the pictures of paths; return the numbers of those kept."""
@@ -265,7 +265,7 @@ class _Maker:
         slowest_takes = self.pages.slowest_takes(self.asked, numbers)[:MOST_CRITICAL]
         for topic, _, take in slowest_takes:
             content = self.answer("critical", kind="take", id=take, **{"from": topic})
-            self.parts.add(f"critical?id={take}&kind=take", content)
+            self.parts[f"critical?id={take}&kind=take"] = content
         return numbers
 
     def paths_through(self, paths: pa.Table) -> list[int]:
@@ -280,7 +280,7 @@ class _Maker:
 
     def keep_comparison(self, other: Run, comparison: Comparison, chosen: list[int]) -> None:
         content = encoded_comparison(comparison, "paths")
-        self.parts.add(f"compare?other={other.run_id}&what=paths", content)
+        self.parts[f"compare?other={other.run_id}&what=paths"] = content
         for what in ("callbacks", "topics"):
             self.keep("compare", other=other.run_id, what=what)
         for name in ("path", "row"):
@@ -306,7 +306,7 @@ class _Maker:
         }
         if not self.asked.length_ns:
             self.keep_stretch(0, window, None)
-            self.parts.add("edge?", encode(self.asked.rows("edge", window)))
+            self.parts["edge?"] = encode(self.asked.rows("edge", window))
             head["stretches"] = [{"start": 0, "end": 1, "whole": True}]
             head["notes"] = self.notes
             return head
@@ -322,7 +322,7 @@ class _Maker:
             )
         if count * _BYTES_PER_BAR <= room or rows is not None:
             self.keep_stretch(0, window, rows)
-            self.parts.add("edge?", encode(self.asked.rows("edge", window)))
+            self.parts["edge?"] = encode(self.asked.rows("edge", window))
             head["stretches"] = [{"start": head["start"], "end": head["end"], "whole": True}]
         else:
             self.keep_thinned(head, window, room, count)
@@ -341,8 +341,8 @@ class _Maker:
                 )
             )
         slim = table.select(["row_key", "kind", "id", "start_at", "length", "flags"])
-        self.parts.add(f"detail?place={place}", encode(slim))
-        self.parts.add(f"links?place={place}", encode(links))
+        self.parts[f"detail?place={place}"] = encode(slim)
+        self.parts[f"links?place={place}"] = encode(links)
         return int(table.num_rows)
 
     def rows_on(self, paths: list[int]) -> list[int]:
@@ -379,7 +379,7 @@ class _Maker:
             if size <= room * _LEVEL_SHARE or bins <= 256:
                 break
             bins //= 2
-        self.parts.add("level?", level)
+        self.parts["level?"] = level
         head["bin"] = bin_ns
         room -= size
         each = window.end_ns - window.start_ns
@@ -406,7 +406,7 @@ class _Maker:
             (name, "ascending")
             for name in ("from_kind", "to_kind", "from_id", "to_id", "link_kind")
         ]
-        self.parts.add("edge?", encode(distinct.sort_by(order)))
+        self.parts["edge?"] = encode(distinct.sort_by(order))
         head["stretches"] = [
             {"start": stretch.start_ns - origin, "end": stretch.end_ns - origin}
             for stretch in stretches
