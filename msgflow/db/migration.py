@@ -18,12 +18,14 @@ import duckdb
 from msgflow.db import objects
 from msgflow.db.connection import (
     connect,
+    definitions,
     has_current_views,
     is_empty,
     recorded_revision,
     require_known,
+    require_ours,
+    require_tables,
 )
-from msgflow.db.definition_check import definitions, require_ours, require_tables
 from msgflow.db.empty_database import write_empty
 from msgflow.db.sandbox import open_file
 from msgflow.db.transaction import transaction

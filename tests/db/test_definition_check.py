@@ -14,8 +14,8 @@ from thorough import few
 import msgflow
 from msgflow.clocks.clocks_file import read_clock_sync
 from msgflow.clocks.correction import apply_clocks
-from msgflow.db import definition_check, migration, objects
-from msgflow.db.connection import connect
+from msgflow.db import migration, objects
+from msgflow.db.connection import connect, definitions
 from msgflow.errors import DatabaseError
 from msgflow.ingest import ingest
 from msgflow.links.annotations import apply_links
@@ -165,7 +165,7 @@ def test_a_database_of_this_msgflow_is_written_and_read(
 ) -> None:
     """Also where there is no cache, which only saves time."""
     with connect(small_database, read_only=False) as con:
-        assert set(definition_check.definitions(con)) > {"view main.run", "table store.run"}
+        assert set(definitions(con)) > {"view main.run", "table store.run"}
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path / "none"))
         (tmp_path / "none").write_text("a file")
