@@ -34,11 +34,10 @@ _OF_VERDICT = ("open_end", "why_callback", "suspect")
 # By what took longest in a slow flow: the query that shows more of it, by node or by topic.
 _BY_NODE = {
     "callback": ("callbacks", "--each", "--slowest", "5"),
-    "executor_busy": ("waits", "--by", "instance", "--slowest", "5"),
-    "all_threads_busy": ("waits", "--by", "instance", "--slowest", "5"),
-    "blocked": ("waits", "--by", "instance", "--slowest", "5"),
-    "undecided": ("waits", "--by", "instance", "--slowest", "5"),
-    "take_to_callback": ("waits", "--by", "instance", "--slowest", "5"),
+    **dict.fromkeys(
+        ("executor_busy", "all_threads_busy", "blocked", "undecided", "take_to_callback"),
+        ("waits", "--by", "instance", "--slowest", "5"),
+    ),
     "timer": ("timers",),
     "service": ("service-latency",),
 }
@@ -209,6 +208,13 @@ def _explained(
     waits = _rows(connection, _OWN_WAITS, waits, callbacks=callbacks)
     losses = _rows(connection, _OWN_LOSSES, losses, places=places)
     paths = _rows(connection, _WORST_FIRST, paths, path=path)
+    notes = [*_cures(verdict)]
+    if skipped:
+        notes.append(
+            f"without the first {skipped:g} s, a warm-up: the longest latencies lie there (--start"
+            " 0s reads them, too)"
+        )
+    notes += [*ends_here, *_outlier(run, paths.table.to_pylist()[0]), *paths.notes, *flow.notes]
     return Explanation(
         run=run,
         start=times.start,
@@ -220,25 +226,7 @@ def _explained(
         waits=waits,
         losses=losses,
         steps=tuple(dict.fromkeys(_steps(places, ends_here, pieces, losses, skipped))),
-        notes=tuple(
-            dict.fromkeys(
-                [
-                    *_cures(verdict),
-                    *(
-                        [
-                            f"without the first {skipped:g} s, a warm-up: the longest latencies lie"
-                            " there (--start 0s reads them, too)"
-                        ]
-                        if skipped
-                        else []
-                    ),
-                    *ends_here,
-                    *_outlier(run, paths.table.to_pylist()[0]),
-                    *paths.notes,
-                    *flow.notes,
-                ]
-            )
-        ),
+        notes=tuple(dict.fromkeys(notes)),
     )
 
 

@@ -9,11 +9,7 @@ Value = None | bool | int | float | str | list["Value"]
 _INTEGER = re.compile(r"[+-]?\d+")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _WORDS: dict[str, Value] = {"null": None, "true": True, "false": False}
-_INTEGER_TYPES = frozenset(
-    f"{sign}{size}"
-    for sign in ("", "U")
-    for size in ("TINYINT", "SMALLINT", "INTEGER", "BIGINT", "HUGEINT")
-)
+_INTEGER_TYPE = re.compile(r"U?(TINYINT|SMALLINT|INTEGER|BIGINT|HUGEINT)")
 _REAL_TYPES = frozenset(("FLOAT", "DOUBLE"))
 _YES = frozenset(("true", "yes", "on", "1"))
 _NO = frozenset(("false", "no", "off", "0"))
@@ -21,7 +17,7 @@ _NO = frozenset(("false", "no", "off", "0"))
 
 def is_integer(type_name: str) -> bool:
     """Tell whether `type_name` is an integer type of DuckDB."""
-    return type_name.upper() in _INTEGER_TYPES
+    return _INTEGER_TYPE.fullmatch(type_name.upper()) is not None
 
 
 def described_type(type_name: str) -> str:
@@ -64,9 +60,7 @@ def parse_text(text: str, type_name: str) -> Value:
     if name in _REAL_TYPES or name.startswith("DECIMAL"):
         return float(text)
     if name == "BOOLEAN":
-        if text.lower() in _YES:
-            return True
-        if text.lower() in _NO:
-            return False
-        raise ValueError(text)
+        if text.lower() not in _YES | _NO:
+            raise ValueError(text)
+        return text.lower() in _YES
     return text
