@@ -19,6 +19,8 @@ from msgflow.db import objects
 from msgflow.db.sandbox import STORAGE_VERSION, open_file
 from msgflow.db.store_table import store_file
 from msgflow.db.transaction import transaction
+from msgflow.errors import UsageError
+from msgflow.files.atomic import replacing
 from msgflow.sql.quoting import literal
 from msgflow.version import __version__
 
@@ -57,15 +59,11 @@ def _cached() -> bytes | None:
 
 def _cache(content: bytes) -> None:
     """Keep an empty database in the cache, if possible."""
-    with contextlib.suppress(OSError, RuntimeError):
+    with contextlib.suppress(OSError, RuntimeError, UsageError):
         path = _cache_file()
         path.parent.mkdir(parents=True, exist_ok=True)
-        aside = path.with_suffix(f".{os.getpid()}.part")
-        try:
+        with replacing(path) as aside:
             aside.write_bytes(hashlib.sha256(content).hexdigest().encode() + b"\n" + content)
-            aside.replace(path)
-        finally:
-            aside.unlink(missing_ok=True)
         kept = sorted(path.parent.iterdir(), key=lambda each: each.stat().st_mtime)
         for old in kept[:-_MOST_KEPT]:
             old.unlink()

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import duckdb
 
 from msgflow.errors import UsageError
+from msgflow.query.flow import KINDS
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.sql.statement import Statements
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 Params = dict[str, Any]
 
-_KINDS = ("publication", "take", "callback_instance", "request", "response")
 _LARGEST = 2**62
 
 DIRECTORY = Path(__file__).parent / "sql"
@@ -113,8 +113,8 @@ class Question:
     def kind(self) -> str:
         """What a flow begins with."""
         kind = self.params.get("kind")
-        if kind not in _KINDS:
-            raise UsageError(f"a flow begins with one of {', '.join(_KINDS)} — {kind}")
+        if kind not in KINDS:
+            raise UsageError(f"a flow begins with one of {', '.join(KINDS)} — {kind}")
         return str(kind)
 
     def text(self, name: str) -> str:
