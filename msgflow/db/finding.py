@@ -28,7 +28,7 @@ from msgflow.sql.quoting import literal
 from msgflow.sql.statement import Statements
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Sequence
 
     import duckdb
 
@@ -121,7 +121,7 @@ def composed(layer: str) -> tuple[Header, ...]:
         description = (
             "What an ingest can find, and what the headers in `schema/health` say about it."
         )
-        rows = ",\n".join(map(_row, (*kinds_of("input"), *kinds_of("recording"))))
+        rows = _rows((*kinds_of("input"), *kinds_of("recording")))
         body = f"SELECT {_OF_KIND}\nFROM (\nVALUES\n{rows}\n) AS kind ({_OF_KIND})\n"
     else:
         return ()
@@ -190,27 +190,18 @@ def commands_after(findings: Sequence[Finding]) -> list[str]:
 
 def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:
     """Return the broken rules of all runs, or of one, in the order of `read_findings`."""
-    found = (each for header in kinds_of("database") for each in _broken(con, header, run_id))
-    return sorted(found, key=_order)
-
-
-def _broken(
-    con: duckdb.DuckDBPyConnection, header: Header, run_id: int | None
-) -> Iterator[Finding]:
     from msgflow.db.relation_check import broken_relations
 
-    values: dict[str, object] = {"run_id": run_id}
-    if header.params:
-        values["broken"] = broken_relations(con, run_id)
-    fields = ", ".join(Finding.__dataclass_fields__)
+    headers = kinds_of("database")
     rows = con.execute(
-        f"SELECT {fields} FROM (SELECT * REPLACE (coalesce(subject, 'the database') AS subject) "
-        f"FROM (\n{statement([header])}\n)) "
-        f"JOIN (VALUES\n{_row(header)}\n) AS kind ({_OF_KIND}) USING (name) "
+        f"SELECT {', '.join(Finding.__dataclass_fields__)} "
+        "FROM (SELECT * REPLACE (coalesce(subject, 'the database') AS subject) "
+        f"FROM (\n{statement(headers)}\n)) "
+        f"JOIN (VALUES\n{_rows(headers)}\n) AS kind ({_OF_KIND}) USING (name) "
         "WHERE run_id = coalesce($run_id, run_id)",
-        values,
+        {"run_id": run_id, "broken": broken_relations(con, run_id)},
     ).fetchall()
-    yield from (Finding(*row) for row in rows)
+    return sorted((Finding(*row) for row in rows), key=_order)
 
 
 def _order(finding: Finding) -> tuple[int, str, int, str, int, str]:
@@ -219,12 +210,13 @@ def _order(finding: Finding) -> tuple[int, str, int, str, int, str]:
     return severity, finding.name, finding.run_id, finding.subject, count, detail
 
 
-def _row(header: Header) -> str:
-    texts = (
-        short_name(header), phase_of(header), header.severity, header.title, header.description,
-        header.cause, header.cure,
+def _rows(headers: Iterable[Header]) -> str:
+    rows = (
+        (short_name(each), phase_of(each), each.severity, each.title, each.description, each.cause,
+         each.cure)
+        for each in headers
     )  # fmt: skip
-    return f"    ({', '.join(literal(text or '') for text in texts)})"
+    return ",\n".join(f"    ({', '.join(literal(text or '') for text in row)})" for row in rows)
 
 
 @cache

@@ -189,18 +189,15 @@ def create_statement(header: Header) -> str:
 def drop(con: duckdb.DuckDBPyConnection) -> None:
     """Drop all views and macros, inside the open transaction."""
     con.execute("CREATE SCHEMA IF NOT EXISTS derive")
-    for schema, name in con.execute(
-        "SELECT schema_name, view_name FROM duckdb_views() WHERE NOT internal "
-        "AND database_name = current_database() AND schema_name IN ('main', 'derive', 'store')"
-    ).fetchall():
-        con.execute(f"DROP VIEW {identifier(schema)}.{identifier(name)}")
-    for schema, name, kind in con.execute(
-        "SELECT DISTINCT schema_name, function_name, function_type FROM duckdb_functions() "
-        "WHERE NOT internal AND database_name = current_database() "
-        "AND function_type IN ('macro', 'table_macro')"
-    ).fetchall():
-        table = "TABLE " if kind == "table_macro" else ""
-        con.execute(f"DROP MACRO {table}{identifier(schema)}.{identifier(name)}")
+    found = con.execute(
+        "SELECT 'VIEW', schema_name, view_name FROM duckdb_views() WHERE NOT internal "
+        "AND database_name = current_database() AND schema_name IN ('main', 'derive', 'store') "
+        "UNION ALL SELECT DISTINCT if(function_type = 'macro', 'MACRO', 'MACRO TABLE'), "
+        "schema_name, function_name FROM duckdb_functions() WHERE NOT internal "
+        "AND database_name = current_database() AND function_type IN ('macro', 'table_macro')"
+    ).fetchall()
+    for kind, schema, name in found:
+        con.execute(f"DROP {kind} {identifier(schema)}.{identifier(name)}")
 
 
 def _comment(
