@@ -192,7 +192,8 @@ class _Work:
         columns = [f"{subject.label[name]} AS subject"]
         for place, requirement in enumerate(requirements):
             metric = subject.metrics[requirement.metric]
-            value = metric.value.format(requirement.condition.statistic)
+            statistic = requirement.condition.statistic
+            value = metric.value.format(statistic, samples=metric.samples)
             key = KEYS[metric.worst] if metric.worst else "NULL"
             columns.append(f"({value})::DOUBLE AS value_{place}")
             columns.append(f"({metric.samples})::BIGINT AS samples_{place}")
@@ -226,7 +227,7 @@ class _Work:
         return where, {f"wanted_{field}": text.value for field, text in target.chosen.items()}
 
     @staticmethod
-    def _matches(header: Header, field: str, columns: tuple[str, ...]) -> str:
+    def _matches(header: Header, field: str, columns: Sequence[str]) -> str:
         is_named = " OR ".join(f"{column} = $wanted_{field}" for column in columns)
         is_meant = " OR ".join(f"{column} GLOB $wanted_{field}" for column in columns)
         if any(column.name == "is_internal" for column in header.columns):
