@@ -10,7 +10,7 @@ WITH path AS (
     FROM (SELECT *, row_number() OVER () AS place, string_split(path, ' → ') AS steps
           FROM e2e_latency)
     -- A service that is called has brackets.
-    WHERE len(steps) > 4 AND steps[2] LIKE '/%' AND steps[-2] LIKE '/%'
+    WHERE steps[2] LIKE '/%' AND steps[-2] LIKE '/%'
     GROUP BY ALL
     HAVING first <> last AND min(pairs) >= $least_values
 ),
