@@ -51,7 +51,6 @@ from fleet_robots import record, robot_of, write_broken
 from object_store import ObjectStore, object_store
 
 from msgflow import Database
-from msgflow.fleet.failure import read_failures
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_connection import Reading, choose
 from msgflow.fleet.pack import pack
@@ -108,7 +107,7 @@ def measured(folder: Path, count: int, good: list[str]) -> Iterator[str]:
         lake = Lake.open(LAKE)
         runs = lake.runs().to_pylist()
         assert sorted(run["name"] for run in runs) == sorted(good)
-        failed = read_failures(lake).to_pylist()
+        failed = lake.failures().to_pylist()
         assert {row["reason"] for row in failed} == {"broken"}, failed
         assert len(failed) == count - len(good)
         whole = {
@@ -120,7 +119,7 @@ def measured(folder: Path, count: int, good: list[str]) -> Iterator[str]:
         yield f"{len(runs)} runs in {tries} tries by the drivers that committed them; none half"
         copy(lake, folder / "lake")
     begin, cpu = time.monotonic(), children_cpu()
-    alone = Lake.open_or_create(folder / "alone")
+    alone = Lake.open(folder / "alone", create=True)
     jobs = [(folder / "recordings" / run["name"], run["source"], alone.store.url) for run in runs]
     with ProcessPoolExecutor(2) as pool:
         alone.commit(pool.map(ingest_alone, jobs))
@@ -291,7 +290,7 @@ def require_same_runs(one: Lake, other: Lake) -> None:
     """Raise where two lakes differ in their runs or failures."""
     left = {"part", "view_part", "database_part", "committed_ns", "failed_ns", "worker"}
     left |= {"seconds", "tries"}
-    for tables in ([one.runs(), other.runs()], [read_failures(one), read_failures(other)]):
+    for tables in ([one.runs(), other.runs()], [one.failures(), other.failures()]):
         same = [each for each in tables[0].column_names if each not in left]
         assert tables[0].select(same).equals(tables[1].select(same)), tables[0].column_names
 

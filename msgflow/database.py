@@ -753,8 +753,7 @@ class Database:
         skipped = self._ask(warm_up, one) if start is None else 0.0
         start = f"{skipped:g}s" if skipped else start
         results = {
-            name: self.query(name, run=one.run_id, start=start).to_arrow().to_pylist()
-            for name in QUERIES
+            name: self.query(name, run=one.run_id, start=start).to_arrow() for name in QUERIES
         }
         return suggest_targets(one, results, margin, skipped)
 

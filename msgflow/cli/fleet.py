@@ -84,7 +84,8 @@ def ingest(
     most = None if memory is None else bytes_of(memory, "--memory 4GB")
     part = _shard(shard)
     from msgflow.cli.progress import fleet_progress
-    from msgflow.fleet.ingest import Options, fleet_ingest
+    from msgflow.fleet.ingest import fleet_ingest
+    from msgflow.fleet.task import Options
 
     given: dict[str, Any] = {
         "reader": reader.value,
@@ -102,7 +103,7 @@ def ingest(
         tries=tries,
         timeout=seconds,
         memory=most,
-        scratch=None if scratch is None else str(scratch),
+        scratch=None if scratch is None else str(scratch.absolute()),
     )
     with fleet_progress(quiet) as progress:
         report = fleet_ingest(

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing, contextmanager
+from functools import partial
 from itertools import chain, count
 from pathlib import Path
 from threading import Event
@@ -106,7 +108,6 @@ def command(
     from msgflow.sql.interrupt import until_interrupted
     from msgflow.verify.verify import Verdict
     from msgflow.watch.alarm import violation_line
-    from msgflow.watch.chunk import remove_chunk
     from msgflow.watch.diagnostics import Diagnostics
     from msgflow.watch.flight_recorder import FlightRecorder
     from msgflow.watch.follow import watch_finished, watch_live
@@ -185,7 +186,7 @@ def command(
         if program:
             if output is None:
                 # The recording is ours alone: it need not grow.
-                watcher.on_passed = remove_chunk
+                watcher.on_passed = partial(shutil.rmtree, ignore_errors=True)
             has_failed = _record(program, output, step_ns, live, on_screen=on_screen)
         elif once:
             finished = path_of(str(word)).absolute()
@@ -248,12 +249,13 @@ def _pages(port: int | None, clock_sync: str) -> Iterator[WindowDatabase | None]
         yield None
         return
     from msgflow.cli.sql_process import WarmSql
-    from msgflow.record.session import temporary_directory
+    from msgflow.files.temporary_owner import temporary_directory
+    from msgflow.record.session import TEMPORARY
     from msgflow.view.server import serving
     from msgflow.view.sql_page import MOST_SECONDS
     from msgflow.watch.window_database import WindowDatabase
 
-    with temporary_directory() as directory:
+    with temporary_directory(TEMPORARY) as directory:
         path = directory / "window.duckdb"
         database = WindowDatabase(path, clock_sync=clock_sync)
         with (
@@ -300,15 +302,16 @@ def _record(
     on_screen: bool,
 ) -> bool:
     """Start a program, record it, and watch the recording until it ends; tell whether it failed."""
+    from msgflow.files.temporary_owner import temporary_directory
     from msgflow.record.recording import record
-    from msgflow.record.session import Channel, temporary_directory
+    from msgflow.record.session import TEMPORARY, Channel
 
     name = f"watch-{time.strftime('%Y%m%d-%H%M%S')}-{os.getpid()}"
     # A file, since the program would stop if it wrote to a full pipe.
     log = _free(f"{directory or name}.log") if on_screen and sys.stderr.isatty() else None
     ended = Event()
     with (
-        temporary_directory() as temporary,
+        temporary_directory(TEMPORARY) as temporary,
         ThreadPoolExecutor(1) as beside,
     ):
         target = (directory or temporary / "recording").absolute()

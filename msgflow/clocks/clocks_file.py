@@ -10,7 +10,7 @@ import re
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.files.text_file import read_text
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 METHODS = ("none", "messages")
-_FIELDS = ("offset_ns", "drift_ppb", "reference_ns", "uncertainty_ns")
+FIELDS = ("offset_ns", "drift_ppb", "reference_ns", "uncertainty_ns")
 _EXAMPLE = "robot-b: {offset_ns: -350000000, drift_ppb: 20}"
 # Digits may stand in groups, as in YAML and TOML. No time has more of them.
 _INTEGER = re.compile(r"[-+]?[0-9]+(_[0-9]+)*")
@@ -53,12 +53,8 @@ class ClockSync:
     """A way to correct clocks."""
 
     method: str  # 'none', 'messages' or 'file'
-    path: Path | None = None  # the file
-    clocks: tuple[GivenClock, ...] = ()  # its entries, in order
-
-    def fail(self, line: int, what: str, hint: str | None = None) -> NoReturn:
-        """Raise the error of a line of the file."""
-        raise UsageError(f"{self.path}, line {line}: {what}", hint)
+    clocks: tuple[GivenClock, ...] = ()  # entries of the file, in order
+    file: YamlFile | None = None  # for errors, which name the line; it may also be TOML
 
 
 def read_clock_sync(given: str | Path) -> ClockSync:
@@ -66,39 +62,36 @@ def read_clock_sync(given: str | Path) -> ClockSync:
 
     The file is TOML if its name ends with .toml, else YAML. A run decides later whether its hosts
     exist.
-
-    Raises:
-        UsageError: the file cannot be read, or is not of the form above.
     """
     if isinstance(given, str) and given in METHODS:
         return ClockSync(given)
     path = Path(given)
     text = read_text(path, f"neither {' nor '.join(METHODS)} nor a file that can be read", _EXAMPLE)
-    sync = ClockSync("file", path)
-    entries = _toml(text, sync) if _is_toml(path) else _yaml(text, path, sync)
-    clocks = tuple(_clock(sync, *entry) for entry in entries)
+    file = YamlFile(path, _EXAMPLE, _EXAMPLE, text)
+    entries = _toml(text, file) if _is_toml(path) else _yaml(file)
+    clocks = tuple(_clock(file, *entry) for entry in entries)
     if not clocks:
-        sync.fail(1, "the file names no clock", _EXAMPLE)
-    return ClockSync("file", path, clocks)
+        file.fail(1, "the file names no clock", _EXAMPLE)
+    return ClockSync("file", clocks, file)
 
 
 # Both yield: name, its line, and its fields with their lines; a number alone is the offset.
 _Entry = tuple[str, int, dict[str, tuple[str, int]]]
 
 
-def _is_toml(path: Path | None) -> bool:
-    return path is not None and path.suffix == ".toml"
+def _is_toml(path: Path) -> bool:
+    return path.suffix == ".toml"
 
 
-def _toml(text: str, sync: ClockSync) -> Iterator[_Entry]:
+def _toml(text: str, file: YamlFile) -> Iterator[_Entry]:
     try:
         root = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         where = re.search(r"\(at line (\d+)", str(error))
         line = int(where[1]) if where else text.count("\n") + 1
-        sync.fail(line, str(error).partition(" (at ")[0].lower())
+        file.fail(line, str(error).partition(" (at ")[0].lower())
     except (RecursionError, ValueError) as error:  # the latter: a number of thousands of digits
-        raise UsageError(f"not a TOML file of clocks — {sync.path}", _EXAMPLE) from error
+        raise UsageError(f"not a TOML file of clocks — {file.path}", _EXAMPLE) from error
     lines = _toml_lines(text)
     for name, value in root.items():
         line = next(iter(lines.get(name, ())), 1)
@@ -129,19 +122,19 @@ def _toml_scalar(value: object) -> str:
     return "a mapping" if isinstance(value, dict) else str(value)
 
 
-def _yaml(text: str, path: Path, sync: ClockSync) -> Iterator[_Entry]:
-    root = YamlFile(path, _EXAMPLE, _EXAMPLE, text).root()
+def _yaml(file: YamlFile) -> Iterator[_Entry]:
+    root = file.root()
     if root is None:
         return
     if root.id != "mapping":
-        sync.fail(line_of(root), "the file is not a mapping from hosts to offsets", _EXAMPLE)
+        file.fail(line_of(root), "the file is not a mapping from hosts to offsets", _EXAMPLE)
     for name, value in root.value:
         fields = {"offset_ns": (_scalar(value), line_of(value if _scalar(value) else name))}
         if value.id == "mapping":
             fields = {}
             for key, field in value.value:
                 if _scalar(key) in fields:
-                    sync.fail(line_of(key), f"{_scalar(key)} is given twice")
+                    file.fail(line_of(key), f"{_scalar(key)} is given twice")
                 fields[_scalar(key)] = (_scalar(field), line_of(field if _scalar(field) else key))
         yield _scalar(name), line_of(name), fields
 
@@ -150,23 +143,23 @@ def _scalar(node: Any) -> str:
     return str(node.value) if node.id == "scalar" else f"a {node.id}"
 
 
-def _clock(sync: ClockSync, name: str, line: int, fields: dict[str, tuple[str, int]]) -> GivenClock:
+def _clock(file: YamlFile, name: str, line: int, fields: dict[str, tuple[str, int]]) -> GivenClock:
     numbers: dict[str, int] = {}
     for key, (text, field_line) in fields.items():
-        if key not in _FIELDS:
-            quoted = "; a name with dots stands in quotes" if _is_toml(sync.path) else ""
-            sync.fail(field_line, f"a clock has no {key}", f"it has {', '.join(_FIELDS)}{quoted}")
+        if key not in FIELDS:
+            quoted = "; a name with dots stands in quotes" if _is_toml(file.path) else ""
+            file.fail(field_line, f"a clock has no {key}", f"it has {', '.join(FIELDS)}{quoted}")
         if not text:
-            sync.fail(field_line, f"{key} has no value", _EXAMPLE)
+            file.fail(field_line, f"{key} has no value", _EXAMPLE)
         shown = text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}…"
         if not _INTEGER.fullmatch(text):
-            sync.fail(field_line, f"{key} is not a whole number — {shown}", _EXAMPLE)
+            file.fail(field_line, f"{key} is not a whole number — {shown}", _EXAMPLE)
         if len(text) > _MOST_DIGITS:
-            sync.fail(field_line, f"{key} is beyond what clocks have — {shown}", _EXAMPLE)
+            file.fail(field_line, f"{key} is beyond what clocks have — {shown}", _EXAMPLE)
         numbers[key] = int(text)
         limit = _LARGEST_DRIFT_PPB if key == "drift_ppb" else _LARGEST_NS
         if abs(numbers[key]) >= limit or (key == "uncertainty_ns" and numbers[key] < 0):
-            sync.fail(field_line, f"{key} is beyond what clocks have — {text}", _EXAMPLE)
+            file.fail(field_line, f"{key} is beyond what clocks have — {text}", _EXAMPLE)
     if "offset_ns" not in numbers:
-        sync.fail(line, f"{name} has no offset_ns", _EXAMPLE)
+        file.fail(line, f"{name} has no offset_ns", _EXAMPLE)
     return GivenClock(name, line, **numbers)

@@ -5,17 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from msgflow.clocks.clocks_file import FIELDS
 from msgflow.db.derivation import derive_from_clocks
 from msgflow.db.runs import change_runs
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     import duckdb
 
     from msgflow.clocks.clocks_file import ClockSync, GivenClock
+    from msgflow.files.yaml_file import YamlFile
     from msgflow.run.choice import Run
 
 # Columns of a correction.
@@ -33,9 +35,10 @@ ORDER BY sync.clock_id, bound.at_ns
 
 _GIVEN = """
 UPDATE store.clock SET
-    offset_ns = ?, drift_ppb = ?, reference_ns = coalesce(?, reference_ns), uncertainty_ns = ?,
-    drift_uncertainty_ppb = NULL, reference_clock_id = ?, method = 'file'
-WHERE clock_id = ?
+    offset_ns = $offset_ns, drift_ppb = $drift_ppb,
+    reference_ns = coalesce($reference_ns, reference_ns), uncertainty_ns = $uncertainty_ns,
+    drift_uncertainty_ppb = NULL, reference_clock_id = $reference_id, method = 'file'
+WHERE clock_id = $clock_id
 """
 
 
@@ -71,8 +74,8 @@ def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
         _correct(con, "(FROM clock_synchronised WHERE is_connected)")
         con.execute(_BOUNDS, {"run_id": run_id})
         con.execute("DROP TABLE temp.clock_synchronised")
-    elif sync.method == "file":
-        _set_given(con, run_id, sync)
+    elif sync.file is not None:
+        _set_given(con, run_id, sync.file, sync.clocks)
 
 
 def _correct(
@@ -86,22 +89,24 @@ def _correct(
     )
 
 
-def _set_given(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> None:
+def _set_given(
+    con: duckdb.DuckDBPyConnection, run_id: int, file: YamlFile, given_clocks: Sequence[GivenClock]
+) -> None:
     clocks = internal_sql().run(con, "clock_known", {"run_id": run_id}).fetchall()
     chosen: dict[int, GivenClock] = {}
-    for given in sync.clocks:
+    for given in given_clocks:
         found = [clock for clock in clocks if given.name == clock[1]] or [
             clock for clock in clocks if given.name in clock[2]
         ]
         if not found:
-            sync.fail(
+            file.fail(
                 given.line,
                 f"the run has no host or clock of that name — {given.name}",
                 f"it has {_known(clocks)}",
             )
         if len(found) > 1:
             uuids = ", ".join(str(uuid) for _, uuid, _ in found)
-            sync.fail(
+            file.fail(
                 given.line,
                 f"several hosts have that name — {given.name}",
                 f"name the clock by its uuid: {uuids}; or name hosts with ingest --host NAME=PATH",
@@ -109,7 +114,7 @@ def _set_given(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
         clock_id = found[0][0]
         before = chosen.get(clock_id, given)
         if replace(before, name="", line=0) != replace(given, name="", line=0):
-            sync.fail(
+            file.fail(
                 given.line,
                 f"{given.name} and {before.name} (line {before.line}) have one clock, and are"
                 " given different times",
@@ -120,17 +125,8 @@ def _set_given(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> 
     others = [clock_id for clock_id, _, _ in clocks if clock_id not in chosen]
     reference_id = others[0] if len(others) == 1 else min(chosen)
     for clock_id, given in chosen.items():
-        con.execute(
-            _GIVEN,
-            [
-                given.offset_ns,
-                given.drift_ppb,
-                given.reference_ns,
-                given.uncertainty_ns,
-                reference_id,
-                clock_id,
-            ],
-        )
+        values = {name: getattr(given, name) for name in FIELDS}
+        con.execute(_GIVEN, values | {"reference_id": reference_id, "clock_id": clock_id})
     if len(others) == 1:
         con.execute(
             "UPDATE store.clock SET reference_clock_id = clock_id, uncertainty_ns = 0, "

@@ -6,8 +6,15 @@ import contextlib
 import hashlib
 import os
 import re
+import shutil
+import tempfile
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 # A process number is valid in this container, until the machine starts again.
 _NAMESPACE = ("/proc/sys/kernel/random/boot_id", "/proc/self/ns/pid")
@@ -44,6 +51,26 @@ def left_behind(folder: Path, prefix: str, suffix: str, *, by_others: bool = Fal
                 if is_abandoned(owner) or (by_others and owner != mark()):
                     found.append(entry)
     return found
+
+
+@contextmanager
+def temporary_directory(prefix: str, parent: str | None = None) -> Iterator[Path]:
+    """Yield a new directory, and remove it afterwards; those of killed processes go before."""
+    root = Path(parent or tempfile.gettempdir())
+    root.mkdir(parents=True, exist_ok=True)
+    remove_abandoned_directories(prefix, root)
+    directory = tempfile.mkdtemp(prefix=f"{prefix}{mark()}.", dir=root)
+    try:
+        yield Path(directory)
+    finally:
+        shutil.rmtree(directory, ignore_errors=True)
+
+
+def remove_abandoned_directories(prefix: str, root: Path | None = None) -> None:
+    """Remove what `temporary_directory` made in processes that were killed."""
+    for left in (root or Path(tempfile.gettempdir())).glob(f"{prefix}*"):
+        if is_abandoned(left.name.removeprefix(prefix).rpartition(".")[0]):
+            shutil.rmtree(left, ignore_errors=True)
 
 
 @cache

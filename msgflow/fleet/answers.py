@@ -10,53 +10,25 @@ from msgflow.run.slice import Slice
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
     import duckdb
     import pyarrow as pa
 
-    Read = Callable[[duckdb.DuckDBPyConnection, int], pa.Table]
-
-# Named queries, run with their defaults and with internal rows; each gives a table of its name.
-_QUERIES = (
-    "e2e-latency",
-    "callbacks",
-    "waits",
-    "executor-usage",
-    "topics-latency",
-    "topics-delivery",
-    "topics-rate",
-    "timers",
-    "service-latency",
-    "action-latency",
-    "info-quality",
-)
+# Those of statements of the program; buckets of a distribution can be added up.
+_OWN = ("flow", "distribution")
+_FINDING = "finding"
+ANSWERS = (
+    *_OWN, _FINDING, "e2e_latency", "callbacks", "waits", "executor_usage", "topics_latency",
+    "topics_delivery", "topics_rate", "timers", "service_latency", "action_latency", "info_quality",
+)  # fmt: skip
+"""The tables, as they are computed; others have the rows of the named query of that name."""
 
 
-def _statement(name: str) -> Read:
-    def read(con: duckdb.DuckDBPyConnection, run_id: int) -> pa.Table:
-        return internal_sql().run(con, name, {"runs": [run_id]}).to_arrow_table()
-
-    return read
-
-
-def _query(name: str) -> Read:
-    def read(con: duckdb.DuckDBPyConnection, run_id: int) -> pa.Table:
-        return run_query(con, load_query(name), {}, Slice(run_id), internal=True).to_arrow()
-
-    return read
-
-
-def _findings(con: duckdb.DuckDBPyConnection, run_id: int) -> pa.Table:
-    statement = "FROM main.finding WHERE run_id = $run_id ORDER BY ALL"
-    return con.sql(statement, params={"run_id": run_id}).to_arrow_table()
-
-
-ANSWERS: Mapping[str, Read] = {
-    "flow": _statement("fleet_flow"),
-    # Durations, periods, waits and latencies of transport in buckets that can be added up.
-    "distribution": _statement("fleet_distribution"),
-    "finding": _findings,
-    **{name.replace("-", "_"): _query(name) for name in _QUERIES},
-}
-"""By table, as they are computed: returns the rows of a run, with `run_id`, in a fixed order."""
+def answer(con: duckdb.DuckDBPyConnection, run_id: int, table: str) -> pa.Table:
+    """Return the rows of a run, with `run_id`, in a fixed order."""
+    if table in _OWN:
+        return internal_sql().run(con, f"fleet_{table}", {"runs": [run_id]}).to_arrow_table()
+    if table == _FINDING:
+        statement = "FROM main.finding WHERE run_id = $run_id ORDER BY ALL"
+        return con.sql(statement, params={"run_id": run_id}).to_arrow_table()
+    query = load_query(table.replace("_", "-"))
+    return run_query(con, query, {}, Slice(run_id), internal=True).to_arrow()

@@ -82,7 +82,7 @@ def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[s
     enter("ingesting")
     database = directory / "msgflow.duckdb"
     with Database(database) as opened:
-        opened.ingest(path, **task.options)
+        opened.ingest(path, **task.ingest)
     if task.source.startswith(S3):
         _rename_paths(database, f"{directory / 'source'}/", f"{task.source.rpartition('/')[0]}/")
     enter("looking at the source again")
@@ -106,7 +106,7 @@ def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[s
         "source": task.source,
         "source_signature": before.signature,
         "source_bytes": before.size,
-        "options": json.dumps(task.options, sort_keys=True),
+        "options": json.dumps(task.ingest, sort_keys=True),
     }
 
 
@@ -116,8 +116,8 @@ class ChangedError(Exception):
 
 def _require_space(task: Task, directory: Path) -> None:
     free = shutil.disk_usage(directory).free
-    if free < task.disk:
-        words = f"some {task.disk:,} bytes of scratch space are needed, {free:,} are free"
+    if free < task.needed_disk:
+        words = f"some {task.needed_disk:,} bytes of scratch space are needed, {free:,} are free"
         raise OSError(errno.ENOSPC, words)
 
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import heapq
-import itertools
 import json
-import os
 import random
 import time
 from collections import Counter
@@ -15,12 +13,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import MsgflowError, TraceError, UsageError
-from msgflow.fleet.failure import forget_failure, read_failures, write_failure
 from msgflow.fleet.file_store import S3, normal_url
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.recording import Recording, look_at
 from msgflow.fleet.sources import find_recordings
-from msgflow.fleet.task import PASSING, Outcome, Reason, Task, needs, without_secrets
+from msgflow.fleet.task import PASSING, Options, Outcome, Reason, Task, needs, without_secrets
 from msgflow.fleet.workers import make_workers
 
 if TYPE_CHECKING:
@@ -33,23 +30,6 @@ if TYPE_CHECKING:
 _LOOKING_AT_ONCE = 8
 _SECONDS_BETWEEN_LOOKS = 0.5
 _LONGEST_PAUSE = 60.0
-
-
-@dataclass(frozen=True)
-class Options:
-    """Options for all recordings."""
-
-    # Options of the ingest: reader, strict, ignore, events, clock_sync.
-    ingest: Mapping[str, Any] = field(default_factory=dict)
-    views: bool = False  # also write the public views
-    database: bool = True  # also write the database
-    replace: bool = False  # ingest recordings again that the lake has already
-    retry_failed: bool = False  # ingest recordings again that failed before
-    tries: int = 3  # most tries of a recording, if another one may succeed
-    pause: float = 2.0  # seconds before the second try; twice as many before each further one
-    timeout: float = 3600.0  # most seconds of one recording
-    memory: int | None = None  # most bytes of one recording
-    scratch: str | None = None  # folder of each worker for temporary files
 
 
 @dataclass
@@ -113,7 +93,7 @@ def fleet_ingest(
     recordings = [each for each in recordings if not f"{each.source}/".startswith(f"{url}/")]
     if not recordings:
         raise UsageError(f"the lake itself is no recording — {url}", "give other sources")
-    opened = Lake.open_or_create(lake)
+    opened = Lake.open(lake, create=True)
     mine, of_all = recordings, {}
     if shard is not None:
         mine = [each for each in recordings if is_in_shard(each.source, *shard)]
@@ -164,10 +144,9 @@ class _Ingest:
         # Runs that this call wrote, and other sources with the packets of a run.
         self._written: set[str] = set()
         self._alike: dict[str, Mapping[str, Any]] = {}
-        self._failed = {row["source"]: row for row in read_failures(self._lake).to_pylist()}
-        # (when, tie, item): recordings to try again after a pause.
+        self._failed = {row["source"]: row for row in self._lake.failures().to_pylist()}
+        # (when, index, item): recordings to try again after a pause.
         self._paused: list[tuple[float, int, _Item]] = []
-        self._ties = itertools.count()
 
     def run(self, ray: str | None) -> FleetProgress:
         workers: Workers | None = None
@@ -283,14 +262,9 @@ class _Ingest:
             item.index,
             source,
             self._lake.store.url,
-            dict(options.ingest),
-            options.views,
-            options.database,
-            options.timeout,
-            options.memory,
-            options.scratch and os.path.abspath(options.scratch),
-            memory=min(memory, options.memory or memory),
-            disk=disk,
+            **vars(options),
+            needed_memory=min(memory, options.memory or memory),
+            needed_disk=disk,
         )
         item.tries += 1
         if (words := workers.is_too_large(task)) is not None:
@@ -366,7 +340,7 @@ class _Ingest:
         if not _has_changed(there):
             kept = ("source", "source_signature", "tries", "worker")
             known = {name: there[name] for name in kept} | {"labels": dict(other.labels)}
-            write_failure(self._lake, known | self._of_same_packets(row))
+            self._lake.write_failure(known | self._of_same_packets(row))
 
     def _of_same_packets(self, there: Mapping[str, Any]) -> dict[str, Any]:
         hint = "leave out one of the two"
@@ -425,7 +399,7 @@ class _Ingest:
 
     def _forget(self, item: _Item) -> None:
         if self._failed.pop(item.recording.source, None) is not None:
-            forget_failure(self._lake, item.recording.source)
+            self._lake.forget_failure(item.recording.source)
 
     def _failed_now(self, item: _Item, outcome: Outcome) -> None:
         """Try again later if that may help; otherwise write the failure."""
@@ -433,7 +407,7 @@ class _Ingest:
             pause = min(self._options.pause * 2 ** (item.tries - 1), _LONGEST_PAUSE)
             # At random moments: many may have failed together for one reason.
             when = time.monotonic() + pause * random.uniform(0.5, 1.5)
-            heapq.heappush(self._paused, (when, next(self._ties), item))
+            heapq.heappush(self._paused, (when, item.index, item))
             self._progress.retried += 1
             return
         source = item.recording.source
@@ -446,7 +420,7 @@ class _Ingest:
             "tries": item.tries,
             "worker": outcome.worker or None,
         }
-        write_failure(self._lake, row)
+        self._lake.write_failure(row)
         self._failed[source] = row
         self._progress.failed += 1
         self._progress.failures.append((source, str(outcome.reason), outcome.error))

@@ -1,4 +1,4 @@
-"""The lake: its runs, its files, and commits to them.
+"""The lake: its runs, its failed recordings, its files, and commits to them.
 
 The file `run/KEY.parquet` makes a run visible, and takes the place of an earlier one at once. The
 part that it names is complete before, and no file of a part ever changes. `pack` puts the rows of
@@ -12,7 +12,7 @@ import os
 import shlex
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -24,11 +24,14 @@ from msgflow.files.text_file import MOST_BYTES
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.layout import (
     ABOUT,
+    FAILURE,
+    FAILURE_SCHEMA,
     LAKE_REVISION,
     PACKED,
     RUN,
     RUN_SCHEMA,
     about,
+    failure_path,
     metadata,
     require_readable,
     run_path,
@@ -36,9 +39,11 @@ from msgflow.fleet.layout import (
 from msgflow.fleet.parquet import read_parquet
 from msgflow.sql.failure import first_line
 from msgflow.sql.statement import registered
+from msgflow.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
 
@@ -61,33 +66,26 @@ class Lake:
         self.store = store
 
     @classmethod
-    def open(cls, url: str | Path) -> Lake:
-        """Return the lake at an address."""
-        store = Store(url, follows_links=False)
-        content = store.read(ABOUT, MOST_BYTES)
-        if content is None:
-            raise DatabaseError(
-                f"no lake — {store.url}", "msgflow fleet ingest SOURCE --lake makes one"
-            )
-        require_readable(content, store.url)
-        return cls(store)
-
-    @classmethod
-    def open_or_create(cls, url: str | Path) -> Lake:
-        """Return the lake at an address, which is created if there is nothing."""
+    def open(cls, url: str | Path, *, create: bool = False) -> Lake:
+        """Return the lake at an address, which may be created if there is nothing."""
         store = Store(url, follows_links=False)
         # First: what another process writes meanwhile, it writes behind the file that is read next.
-        is_free = _is_free(store)
+        is_free = create and _is_free(store)
         content = store.read(ABOUT, MOST_BYTES)
         if content is not None:
             require_readable(content, store.url)
+        elif not create:
+            raise DatabaseError(
+                f"no lake — {store.url}", "msgflow fleet ingest SOURCE --lake makes one"
+            )
         elif not is_free:
             raise DatabaseError(
                 f"it holds something else than a lake — {store.url}",
                 "give an empty or a new place with --lake",
             )
-        # Also where it exists: so it fails now if nothing can be written, not after a recording.
-        store.put(ABOUT, about())
+        if create:
+            # Also where it exists: so it fails now if nothing can be written.
+            store.put(ABOUT, about())
         return cls(store)
 
     def runs(self) -> pa.Table:
@@ -120,19 +118,20 @@ class Lake:
 
     def _rows(self, name: str) -> pa.Table | None:
         """Return the rows of a file of the table `run`, None if there is no such file."""
-        url = self.store.url_of(run_path(name))
-        content = self.store.read(run_path(name))
-        if content is None:
-            return None
-        try:
-            rows = read_parquet(content, RUN_SCHEMA)
-        except (pa.ArrowException, OSError) as error:
-            raise DatabaseError(
-                f"cannot read the runs of the lake: {first_line(error)} — {url}",
-                "check that nobody else than msgflow has written there",
-            ) from error
-        _require_sound(rows, name, url)
+        hint = "check that nobody else than msgflow has written there"
+        rows = self._read(run_path(name), RUN_SCHEMA, "the runs", hint)
+        if rows is not None:
+            _require_sound(rows, name, self.store.url_of(run_path(name)))
         return rows
+
+    def _read(self, path: str, schema: pa.Schema, what: str, hint: str) -> pa.Table | None:
+        content = self.store.read(path)
+        try:
+            return None if content is None else read_parquet(content, schema)
+        except (pa.ArrowException, OSError) as error:
+            url = self.store.url_of(path)
+            words = f"cannot read {what} of the lake: {first_line(error)} — {url}"
+            raise DatabaseError(words, hint) from error
 
     def commit(self, rows: Iterable[Mapping[str, Any]]) -> None:
         """Add or replace runs, one after the other.
@@ -186,6 +185,27 @@ class Lake:
                 self.store.delete(run_path(key))
         return len(wanted)
 
+    def failures(self) -> pa.Table:
+        """Return the failed recordings: one row each, by source, columns of `FAILURE_SCHEMA`."""
+        tables = [FAILURE_SCHEMA.empty_table()]
+        hint = "delete this file; its recording will be tried again"
+        for entry in self.store.entries(FAILURE, recursive=False):
+            if entry.path.endswith(".parquet"):
+                rows = self._read(entry.path, FAILURE_SCHEMA, "a failure", hint)
+                # Another process may have ingested the recording and deleted this file meanwhile.
+                tables += [] if rows is None else [rows]
+        return pa.concat_tables(tables).sort_by("source")
+
+    def write_failure(self, values: Mapping[str, Any]) -> None:
+        """Write the failure of a recording, in place of an earlier one."""
+        row = {**values, "msgflow_version": __version__, "failed_ns": time.time_ns()}
+        table = pa.Table.from_pylist([row], schema=FAILURE_SCHEMA)
+        self.put_table(failure_path(row["source"]), FAILURE, table, "")
+
+    def forget_failure(self, source: str) -> None:
+        """Delete the failure of a recording, which is in the lake now."""
+        self.store.delete(failure_path(source))
+
     def put_table(self, path: str, table_name: str, table: pa.Table, revision: str) -> None:
         """Write a table as one file."""
         # The schema has the descriptions of columns, which the table may lack.
@@ -202,45 +222,36 @@ class Lake:
         )
         self.store.put(path, sink.getvalue().to_pybytes())
 
-    @contextmanager
-    def writing(self, *, alone: bool = False) -> Iterator[None]:
+    def writing(self, *, alone: bool = False) -> AbstractContextManager[None]:
         """Raise an error if another process packs the lake; alone: if one writes to it at all.
 
         A bucket has no locks.
         """
-        with ExitStack() as stack:
-            try:
-                stack.enter_context(self._locked("", alone=alone, wait=False))
-            except BlockingIOError as error:
-                raise DatabaseError(
-                    f"another msgflow writes to the lake — {self.store.url}",
-                    "wait until it has ended: msgflow fleet pack works alone",
-                ) from error
-            yield
+        return self._locked("", fcntl.LOCK_NB | (fcntl.LOCK_EX if alone else fcntl.LOCK_SH))
 
-    @contextmanager
-    def changing(self) -> Iterator[None]:
+    def changing(self) -> AbstractContextManager[None]:
         """Keep others from changing the table `run` meanwhile, where there are locks."""
         if self.store.is_local:
             with suppress(OSError):  # writing there will tell
                 os.makedirs(self.store.full(RUN), exist_ok=True)
-        with self._locked(RUN, alone=True, wait=True):
-            yield
+        return self._locked(RUN, fcntl.LOCK_EX)
 
     @contextmanager
-    def _locked(self, path: str, *, alone: bool, wait: bool) -> Iterator[None]:
+    def _locked(self, path: str, kind: int) -> Iterator[None]:
         folder = self.store.full(path)
         if not self.store.is_local or not os.path.isdir(folder):
             yield
             return
         descriptor = os.open(folder, os.O_RDONLY)
         try:
-            kind = fcntl.LOCK_EX if alone else fcntl.LOCK_SH
-            try:
-                fcntl.flock(descriptor, kind | (0 if wait else fcntl.LOCK_NB))
-            except OSError as error:  # a network file system may have no locks
-                if isinstance(error, BlockingIOError):
-                    raise
+            with suppress(OSError):  # a network file system may have no locks
+                try:
+                    fcntl.flock(descriptor, kind)
+                except BlockingIOError as error:
+                    raise DatabaseError(
+                        f"another msgflow writes to the lake — {self.store.url}",
+                        "wait until it has ended: msgflow fleet pack works alone",
+                    ) from error
             yield
         finally:
             os.close(descriptor)

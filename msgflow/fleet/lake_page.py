@@ -13,6 +13,7 @@ from msgflow.files.atomic import replacing
 from msgflow.fleet.lake_connection import Reading, choose, lake_errors
 from msgflow.fleet.lake_query import fleet_query, header_of, statements
 from msgflow.fleet.listing import list_failures
+from msgflow.result.query_result import QueryResult
 from msgflow.text.shell import shell_quoted
 from msgflow.view.assets import single_page
 from msgflow.view.table_encoding import encode
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from msgflow.fleet.lake import Lake
-    from msgflow.result.query_result import QueryResult
 
 # Most labels with a table on the page; each takes a query over all flows.
 MOST_LABELS = 8
@@ -53,30 +53,23 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
             for name in _STATEMENTS
         }
     for name, table in tables.items():
-        header = statements().header(name)
-        units = {column.name: column.unit for column in header.columns if column.unit}
-        meta = {"columns": {column.name: column.description for column in header.columns}}
-        parts[f"{name}?"] = encode(table, units=units, meta=meta)
+        parts[f"{name}?"] = _encoded(QueryResult(table, statements().header(name)))
     result = fleet_query(lake, _LATENCY, where=where)
     command = f"msgflow fleet query {_LATENCY} {option}"
-    parts["page_path?"] = _encoded(result, command)
+    parts["page_path?"] = _encoded(result, command=command)
     used = {key for pairs in choice.runs["labels"].to_pylist() for key, _ in pairs or ()}
     labels = sorted(used)[:MOST_LABELS]
     if len(used) > len(labels):
         notes.append(f"tables of {MOST_LABELS} of {len(used)} labels: {', '.join(labels)}")
     for label in labels:
         result = fleet_query(lake, _LATENCY, where=where, group_by=[label])
-        column = result.columns[0]
         table = result.table.rename_columns(["value", *result.columns[1:]])
-        parts[f"page_group?label={label}"] = encode(
-            table,
-            units=result.units,
-            meta={"command": f"{command} --group-by {shell_quoted(column)}"},
-        )
+        meta = {"command": f"{command} --group-by {shell_quoted(result.columns[0])}"}
+        parts[f"page_group?label={label}"] = encode(table, units=result.units, meta=meta)
     wrong = {"where": "severity <> 'info'"}
     result = fleet_query(lake, _FINDINGS, where=where, selection=wrong)
     command = f"msgflow fleet query {header_of(_FINDINGS).words} {option}"
-    parts["page_finding?"] = _encoded(result, command)
+    parts["page_finding?"] = _encoded(result, command=command)
     failures = list_failures(lake).table
     failed = f"msgflow fleet failures --lake {shell_quoted(lake.store.url)}"
     parts["page_failure?"] = encode(_with_time(failures), meta={"command": failed})
@@ -106,13 +99,10 @@ def write_lake_page(lake: Lake, path: Path, *, where: str | None = None, max_siz
     return page
 
 
-def _encoded(result: QueryResult, command: str) -> bytes:
-    described = (
-        {column.name: column.description for column in result.header.columns}
-        if (result.header)
-        else {}
-    )
-    return encode(result.table, units=result.units, meta={"command": command, "columns": described})
+def _encoded(result: QueryResult, **meta: str) -> bytes:
+    assert result.header is not None
+    described = {column.name: column.description for column in result.header.columns}
+    return encode(result.table, units=result.units, meta={**meta, "columns": described})
 
 
 def _with_time(failures: pa.Table) -> pa.Table:

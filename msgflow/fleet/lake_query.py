@@ -215,7 +215,7 @@ def _command(lake: Lake, row: Mapping[str, Any]) -> str | None:
 
 def _tables(header: Header) -> list[str]:
     read = relations_of(statements().text(header.name))
-    return sorted(read & ANSWERS.keys())
+    return sorted(read.intersection(ANSWERS))
 
 
 def _require_tables(reading: Reading, header: Header) -> None:
@@ -228,9 +228,8 @@ def _require_tables(reading: Reading, header: Header) -> None:
 
 
 def _named_tables(text: str) -> list[str]:
-    known = ANSWERS.keys()
     words = set(re.findall(r"\w+", text.lower()))
-    return [name for name in sorted(known) if name in words] + (
+    return [name for name in sorted(ANSWERS) if name in words] + (
         [f"{VIEWS}/{word}" for word in sorted(words)] if VIEWS in words else []
     )
 

@@ -5,6 +5,7 @@ Paths and names are an interface: users read them with DuckDB, Spark and others,
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 import secrets
@@ -77,6 +78,11 @@ def packed_runs(part: str) -> int:
 def run_path(name: str) -> str:
     """Return the path of the row of a run, by its key, or of all that were `PACKED`."""
     return f"{RUN}/{name}.parquet"
+
+
+def failure_path(source: str) -> str:
+    """Return the path of the failure of a recording."""
+    return f"{FAILURE}/{hashlib.sha256(source.encode(errors='replace')).hexdigest()[:24]}.parquet"
 
 
 def part_path(table: str, part: str) -> str:

@@ -4,45 +4,36 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import pyarrow as pa
-
-from msgflow.fleet.failure import read_failures
+from msgflow.db.sandbox import open_memory
 from msgflow.result.query_result import QueryResult
+from msgflow.sql.statement import registered
 
 if TYPE_CHECKING:
+    import pyarrow as pa
+
     from msgflow.fleet.lake import Lake
 
-_OF_RUNS = (
-    "run",
-    "name",
-    "labels",
-    "start_ns",
-    "end_ns",
-    "event_count",
-    "source",
-    "msgflow_version",
-    "seconds",
-    "tries",
-    "worker",
-    "part",
-)
+_LABELS = """
+nullif(list_transform(map_entries(labels), lambda each: each.key || '=' || each.value), [])
+"""
+_RUNS = f"""
+SELECT run, name, {_LABELS} AS labels, start_ns, end_ns, event_count, source, msgflow_version,
+    seconds, tries, worker, part
+FROM listed
+"""
+_FAILURES = f"SELECT * REPLACE ({_LABELS} AS labels) FROM listed"
 
 
 def list_runs(lake: Lake) -> QueryResult:
     """Return the runs of a lake: the table `run`, with labels as KEY=VALUE."""
-    return QueryResult(_written_out(lake.runs().select(_OF_RUNS)))
+    return _listed(lake.runs(), _RUNS)
 
 
 def list_failures(lake: Lake) -> QueryResult:
     """Return the failed recordings: the table `fleet_failure`, with labels as KEY=VALUE."""
-    return QueryResult(_written_out(read_failures(lake)))
+    return _listed(lake.failures(), _FAILURES)
 
 
-def _written_out(table: pa.Table) -> pa.Table:
-    place = table.column_names.index("labels")
-    labels = [
-        [f"{key}={value}" for key, value in pairs] if pairs else None
-        for pairs in table["labels"].to_pylist()
-    ]
-    column = pa.array(labels, pa.list_(pa.string()))
-    return table.set_column(place, "labels", column).replace_schema_metadata()
+def _listed(rows: pa.Table, sql: str) -> QueryResult:
+    with open_memory() as con, registered(con, listed=rows):
+        return QueryResult(con.sql(sql).to_arrow_table())

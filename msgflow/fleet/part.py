@@ -15,7 +15,7 @@ import pyarrow.parquet
 from msgflow.db.connection import recorded_revision
 from msgflow.db.objects import public_names
 from msgflow.errors import TraceError
-from msgflow.fleet.answers import ANSWERS
+from msgflow.fleet.answers import ANSWERS, answer
 from msgflow.fleet.layout import RUN, database_path, metadata, new_part, part_path, view_path
 from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
@@ -64,10 +64,10 @@ def write_part(
     revision = recorded_revision(connection.cursor()) or ""
     first = {KEY: key, PART: part}
     table, compressed = scratch / "table.parquet", scratch / "compressed"
-    for answer, read in ANSWERS.items():
-        rows = read(connection, run_id).to_reader(_ROWS_AT_ONCE)
-        write_rows(table, answer, rows, first, revision)
-        store.put(part_path(answer, part), table)
+    for each in ANSWERS:
+        rows = answer(connection, run_id, each).to_reader(_ROWS_AT_ONCE)
+        write_rows(table, each, rows, first, revision)
+        store.put(part_path(each, part), table)
     if views:
         for view in public_views(connection):
             write_rows(table, view, view_rows(connection, view), first, revision)
@@ -76,8 +76,8 @@ def write_part(
         with file.open("rb") as source, pa.CompressedOutputStream(str(compressed), "zstd") as sink:
             shutil.copyfileobj(source, sink, 1 << 20)
         store.put(database_path(part), compressed)
-    for each in (table, compressed):
-        each.unlink(missing_ok=True)
+    for written in (table, compressed):
+        written.unlink(missing_ok=True)
     return {
         KEY: key,
         PART: part,

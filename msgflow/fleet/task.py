@@ -43,22 +43,32 @@ PASSING = frozenset(
 )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options for all recordings."""
+
+    # Options of the ingest: reader, strict, ignore, events, clock_sync.
+    ingest: dict[str, Any] = field(default_factory=dict)
+    views: bool = False  # also write the public views
+    database: bool = True  # also write the database
+    replace: bool = False  # ingest recordings again that the lake has already
+    retry_failed: bool = False  # ingest recordings again that failed before
+    tries: int = 3  # most tries of a recording, if another one may succeed
+    pause: float = 2.0  # seconds before the second try; twice as many before each further one
+    timeout: float = 3600.0  # most seconds of one recording
+    memory: int | None = None  # most bytes of one recording
+    scratch: str | None = None  # folder of each worker for temporary files, absolute
+
+
 @dataclass(frozen=True)
-class Task:
-    """One recording to ingest, with options."""
+class Task(Options):
+    """One recording to ingest, with the options of all."""
 
     index: int  # number of the recording in the call
     source: str  # address of the recording
     lake: str  # address of the lake
-    # Of the ingest: reader, strict, ignore, events, clock_sync.
-    options: dict[str, Any] = field(default_factory=dict)
-    views: bool = False  # write the public views
-    database: bool = True  # write the database
-    timeout: float = 3600.0  # most seconds
-    most_memory: int | None = None  # most bytes of memory; None for no limit
-    scratch: str | None = None  # folder for temporary files; that of the system when None
-    memory: int = 0  # estimated bytes of memory
-    disk: int = 0  # estimated bytes of scratch space
+    needed_memory: int = 0  # estimated bytes
+    needed_disk: int = 0  # estimated bytes of scratch space
 
 
 @dataclass(frozen=True)

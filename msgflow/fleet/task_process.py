@@ -6,22 +6,17 @@ import contextlib
 import errno
 import json
 import os
-import shutil
 import signal
 import socket
 import subprocess
 import sys
 import tempfile
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from msgflow.files.temporary_owner import is_abandoned, mark
+from msgflow.files.temporary_owner import temporary_directory
 from msgflow.fleet.task import RESULT, STAGE, Outcome, Reason, Task, without_secrets
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 _PREFIX = "msgflow-fleet."
 _LOG = "stderr"
@@ -29,15 +24,14 @@ _SECONDS_BETWEEN_LOOKS = 0.1
 _LONGEST_LOG = 500
 
 
-def run_task(given: dict[str, Any]) -> dict[str, Any]:
-    """Do a task and return its outcome, both as plain values.
+def run_task(task: Task) -> Outcome:
+    """Do a task.
 
     No file of the task stays on this machine. Files that killed workers left here are removed.
     """
-    task = Task(**given)
     begin = time.monotonic()
     try:
-        with _scratch(task.scratch) as directory:
+        with temporary_directory(_PREFIX, task.scratch) as directory:
             outcome = _watched(task, directory, begin)
     except OSError as error:
         is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
@@ -49,21 +43,7 @@ def run_task(given: dict[str, Any]) -> dict[str, Any]:
             " --scratch",
             seconds=time.monotonic() - begin,
         )
-    return {**asdict(outcome), "worker": f"{socket.gethostname()}:{os.getpid()}"}
-
-
-@contextlib.contextmanager
-def _scratch(parent: str | None) -> Iterator[Path]:
-    root = Path(parent or tempfile.gettempdir())
-    root.mkdir(parents=True, exist_ok=True)
-    for left in root.glob(f"{_PREFIX}*"):
-        if is_abandoned(left.name.removeprefix(_PREFIX).rpartition(".")[0]):
-            shutil.rmtree(left, ignore_errors=True)
-    directory = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{mark()}.", dir=root))
-    try:
-        yield directory
-    finally:
-        shutil.rmtree(directory, ignore_errors=True)
+    return replace(outcome, worker=f"{socket.gethostname()}:{os.getpid()}")
 
 
 def _watched(task: Task, directory: Path, begin: float) -> Outcome:
@@ -90,12 +70,12 @@ def _watched(task: Task, directory: Path, begin: float) -> Outcome:
                     directory, begin, Reason.TIMEOUT, f"not done after {task.timeout:g} s"
                 )
             used = _memory(child.pid)
-            if task.most_memory is not None and used > task.most_memory:
+            if task.memory is not None and used > task.memory:
                 return _ended(
                     directory,
                     begin,
                     Reason.TOO_LARGE,
-                    f"it took {used:,} bytes of memory, and may take {task.most_memory:,}",
+                    f"it took {used:,} bytes of memory, and may take {task.memory:,}",
                 )
             time.sleep(_SECONDS_BETWEEN_LOOKS)
     finally:

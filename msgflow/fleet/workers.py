@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,7 +36,7 @@ class OneProcess:
     def is_too_large(self, task: Task) -> str | None:
         """Return a reason if this machine has less memory than the task needs."""
         total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-        return _too_much("memory", task.memory, total)
+        return _too_much("memory", task.needed_memory, total)
 
     def submit(self, task: Task) -> None:
         """Take a task, which `wait` does."""
@@ -47,7 +46,7 @@ class OneProcess:
         """Do the tasks, without a limit of time, and yield their outcomes."""
         while self._tasks:
             task = self._tasks.pop(0)
-            yield task, Outcome(**run_task(asdict(task)))
+            yield task, run_task(task)
 
     def close(self) -> None:
         """Forget all tasks."""
@@ -102,7 +101,7 @@ class RayWorkers:
     def is_too_large(self, task: Task) -> str | None:
         """Return a reason if no node has what the task needs."""
         nodes = [node["Resources"] for node in self._ray.nodes() if node["Alive"]]
-        for name, needed in (("memory", task.memory), (_SCRATCH, task.disk)):
+        for name, needed in (("memory", task.needed_memory), (_SCRATCH, task.needed_disk)):
             most = max((node.get(name, 0) for node in nodes), default=0)
             if most and (words := _too_much(name, needed, int(most))):
                 return words
@@ -112,9 +111,9 @@ class RayWorkers:
         """Hand a task to the cluster."""
         resources = self._ray.cluster_resources()
         # Only some clusters declare their scratch space; on others none can be reserved.
-        more = {"resources": {_SCRATCH: task.disk}} if resources.get(_SCRATCH) else {}
-        ask = self._run.options(num_cpus=1, memory=task.memory, **more)
-        self._running[ask.remote(asdict(task))] = task
+        more = {"resources": {_SCRATCH: task.needed_disk}} if resources.get(_SCRATCH) else {}
+        ask = self._run.options(num_cpus=1, memory=task.needed_memory, **more)
+        self._running[ask.remote(task)] = task
 
     def wait(self, seconds: float) -> Iterator[tuple[Task, Outcome]]:
         """Yield finished tasks; wait for the first, at most `seconds`."""
@@ -124,7 +123,7 @@ class RayWorkers:
         for reference in done:
             task = self._running.pop(reference)
             try:
-                yield task, Outcome(**self._ray.get(reference))
+                yield task, self._ray.get(reference)
             except self._ray.exceptions.RayError as error:
                 words = f"its worker is gone ({type(error).__name__}): {first_line(error)}"
                 yield task, Outcome(reason=Reason.WORKER_LOST, stage="on a worker", error=words)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import pyarrow as pa
+
 from msgflow.db.derivation import derive, learn_topics
 from msgflow.db.runs import change_runs
 from msgflow.links.matching import match_links, matches
-from msgflow.sql.statement import internal_sql
+from msgflow.sql.statement import internal_sql, registered
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -17,8 +19,8 @@ if TYPE_CHECKING:
     import duckdb
 
     from msgflow.errors import UsageError
+    from msgflow.files.yaml_file import YamlFile
     from msgflow.links.links_file import DeclaredLink, DeclaredTopic, LinksFile
-    from msgflow.links.matching import MatchedLink
     from msgflow.run.choice import Run
 
 
@@ -79,10 +81,18 @@ def declare_links(
     """
     topic_count = _declare_topics(con, run_id, file)
     matched = match_links(con, run_id, file, leave_out)
-    # Before we delete any: one transaction cannot use a key twice.
-    ((first,),) = con.execute(
-        "SELECT coalesce(max(annotation_id), 0) + 1 FROM store.annotation"
-    ).fetchall()
+    ids = pa.list_(pa.int64())
+    given = pa.table(
+        {
+            "kind": pa.array([link.kind for link in matched], pa.string()),
+            "process_id": pa.array([link.process_id for link in matched], pa.int64()),
+            "inputs": pa.array([[each.id for each in link.inputs] for link in matched], ids),
+            "outputs": pa.array([[each.id for each in link.outputs] for link in matched], ids),
+            "depth": pa.array([link.depth for link in matched], pa.int64()),
+        }
+    )
+    with registered(con, matched=given):
+        internal_sql().keep(con, "declared_link", {"run_id": run_id})
     for table in ("annotation_input", "annotation_output", "annotation"):
         con.execute(
             f"DELETE FROM store.{table} WHERE run_id = $run_id AND annotation_id IN "
@@ -90,46 +100,20 @@ def declare_links(
             "WHERE run_id = $run_id AND source = 'file')",
             {"run_id": run_id},
         )
-    unique = {_key(link): link for link in matched}
-    traced = {
-        (kind, process_id, tuple(inputs or ()), tuple(outputs or ()))
-        for kind, process_id, inputs, outputs in internal_sql()
-        .run(con, "link_declared", {"run_id": run_id})
-        .fetchall()
-    }
-    added = [link for key, link in unique.items() if key not in traced]
-    for annotation_id, link in enumerate(added, start=first):
-        _insert(con, run_id, annotation_id, link)
-    return len(unique), len(unique) - len(added), topic_count
-
-
-def _insert(
-    con: duckdb.DuckDBPyConnection, run_id: int, annotation_id: int, link: MatchedLink
-) -> None:
-    con.execute(
-        "INSERT INTO store.annotation "
-        "(annotation_id, run_id, kind, source, process_id, queue_depth) "
-        "VALUES (?, ?, ?, 'file', ?, ?)",
-        [annotation_id, run_id, link.kind, link.process_id, link.depth],
-    )
-    for table, column, endpoints in (
-        ("annotation_input", "subscription_id", link.inputs),
-        ("annotation_output", "publisher_id", link.outputs),
+    for table, columns in (
+        ("annotation", "kind, 'file' AS source, process_id, depth AS queue_depth"),
+        ("annotation_input", "unnest(inputs) AS subscription_id"),
+        ("annotation_output", "unnest(outputs) AS publisher_id"),
     ):
         con.execute(
-            f"INSERT INTO store.{table} (run_id, annotation_id, {column}) "
-            "SELECT ?, ?, unnest(?::BIGINT[])",
-            [run_id, annotation_id, [endpoint.id for endpoint in endpoints]],
+            f"INSERT INTO store.{table} BY NAME SELECT annotation_id, $run_id AS run_id, {columns} "
+            "FROM declared_link WHERE annotation_id IS NOT NULL",
+            {"run_id": run_id},
         )
-
-
-def _key(link: MatchedLink) -> tuple[str, int, tuple[int, ...], tuple[int, ...]]:
-    return (
-        link.kind,
-        link.process_id,
-        tuple(endpoint.id for endpoint in link.inputs),
-        tuple(endpoint.id for endpoint in link.outputs),
-    )
+    ((total, known),) = con.execute(
+        "SELECT count(*), count(*) - count(annotation_id) FROM declared_link"
+    ).fetchall()
+    return total, known, topic_count
 
 
 def _without_effect(con: duckdb.DuckDBPyConnection, run_id: int) -> Iterator[str]:
@@ -180,8 +164,8 @@ def _declare_topics(con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile
         return 0
     rows = internal_sql().run(con, "unnamed_endpoint", {"run_id": run_id}).fetchall()
     endpoints = [Unnamed(*row) for row in rows]
-    chosen = [(topic, _match(file, topic, endpoints)) for topic in file.topics]
-    _refuse_contradictions(file, chosen)
+    chosen = [(topic, _match(file.file, topic, endpoints)) for topic in file.topics]
+    _refuse_contradictions(file.file, chosen)
     for topic, endpoint in chosen:
         con.execute(
             f"UPDATE store.{endpoint.kind} SET topic_name = $name, is_topic_declared = true, "
@@ -194,7 +178,7 @@ def _declare_topics(con: duckdb.DuckDBPyConnection, run_id: int, file: LinksFile
     return len({topic.name.value for topic in file.topics})
 
 
-def _match(file: LinksFile, topic: DeclaredTopic, endpoints: Sequence[Unnamed]) -> Unnamed:
+def _match(file: YamlFile, topic: DeclaredTopic, endpoints: Sequence[Unnamed]) -> Unnamed:
     found = [endpoint for endpoint in endpoints if endpoint.fits(topic)]
     if not found:
         file.fail(
@@ -212,9 +196,7 @@ def _match(file: LinksFile, topic: DeclaredTopic, endpoints: Sequence[Unnamed]) 
     return found[0]
 
 
-def _refuse_contradictions(
-    file: LinksFile, chosen: Sequence[tuple[DeclaredTopic, Unnamed]]
-) -> None:
+def _refuse_contradictions(file: YamlFile, chosen: Sequence[tuple[DeclaredTopic, Unnamed]]) -> None:
     """Raise if one topic would have two names."""
     first: dict[int, DeclaredTopic] = {}
     for topic, endpoint in chosen:

@@ -28,7 +28,6 @@ from msgflow.files.yaml_file import Text, YamlFile, line_of
 
 if TYPE_CHECKING:
     from pathlib import Path
-    from typing import NoReturn
 
 # Links to what a node publishes later, from messages that it keeps.
 # The synchronous ones need a message of every input.
@@ -80,13 +79,9 @@ class DeclaredTopic:
 class LinksFile:
     """A file with declared links."""
 
-    path: Path
+    file: YamlFile  # for errors, which name the line
     links: tuple[DeclaredLink, ...]  # its links, in order
     topics: tuple[DeclaredTopic, ...] = ()  # its topics, in order
-
-    def fail(self, line: int, what: str, hint: str | None = None) -> NoReturn:
-        """Raise the error of a line."""
-        YamlFile(self.path, _EXAMPLE, _QUOTING).fail(line, what, hint)
 
 
 def read_links(path: Path, content: str | None = None) -> LinksFile:
@@ -94,7 +89,7 @@ def read_links(path: Path, content: str | None = None) -> LinksFile:
     file = YamlFile(path, _EXAMPLE, _QUOTING, content)
     links, topics = file.entries("links", "topics")
     return LinksFile(
-        path,
+        file,
         tuple(_link(file, entry) for entry in links),
         tuple(_topic(file, entry) for entry in topics),
     )

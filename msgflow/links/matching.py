@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from msgflow.errors import UsageError
 from msgflow.links.links_file import INDIRECT_KINDS, SYNCHRONOUS_KINDS
+from msgflow.sql.statement import internal_sql
 from msgflow.text.name_suggestions import meant_or, nearest
 
 if TYPE_CHECKING:
@@ -17,24 +18,9 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.files.yaml_file import Text
+    from msgflow.files.yaml_file import Text, YamlFile
     from msgflow.links.links_file import DeclaredLink, LinksFile
 
-_NODES = """
-SELECT
-    n.node_id, main.node_name(n.full_name), n.process_id, coalesce(p.name, '?'), p.pid, h.hostname
-FROM main.node AS n
-JOIN main.process AS p ON n.process_id = p.process_id
-JOIN main.host AS h ON p.host_id = h.host_id
-WHERE n.run_id = ? AND n.full_name IS NOT NULL
-ORDER BY n.node_id
-"""
-_TOPICS = """
-SELECT node_id, {kind}_id, topic_name, is_internal
-FROM main.{kind}
-WHERE run_id = ? AND node_id IS NOT NULL AND topic_name IS NOT NULL
-ORDER BY {kind}_id
-"""
 _SHOWN = 12
 
 
@@ -83,35 +69,25 @@ def match_links(
     matched: list[MatchedLink] = []
     for link in file.links:
         try:
-            matched += _match(file, link, nodes)
+            matched += _match(file.file, link, nodes)
         except UsageError as error:
             if leave_out is None:
                 raise
             leave_out(link, error)
-    _refuse_cycles(file, matched)
+    _refuse_cycles(file.file, matched)
     return tuple(matched)
 
 
-def _read_nodes(con: duckdb.DuckDBPyConnection, run_id: int) -> tuple[Node, ...]:
-    subscriptions = _read_endpoints(con, run_id, "subscription")
-    publishers = _read_endpoints(con, run_id, "publisher")
-    return tuple(
-        Node(tuple(subscriptions.get(node_id, ())), tuple(publishers.get(node_id, ())), *named)
-        for node_id, *named in con.execute(_NODES, [run_id]).fetchall()
-    )
+def _read_nodes(con: duckdb.DuckDBPyConnection, run_id: int) -> list[Node]:
+    rows = internal_sql().run(con, "link_node", {"run_id": run_id}).fetchall()
+    return [Node(_endpoints_of(heard), _endpoints_of(said), *named) for heard, said, *named in rows]
 
 
-def _read_endpoints(
-    con: duckdb.DuckDBPyConnection, run_id: int, kind: str
-) -> Mapping[int, list[Endpoint]]:
-    endpoints: dict[int, list[Endpoint]] = {}
-    rows = con.execute(_TOPICS.format(kind=kind), [run_id]).fetchall()
-    for node_id, number, topic, is_internal in rows:
-        endpoints.setdefault(node_id, []).append(Endpoint(number, topic, bool(is_internal)))
-    return endpoints
+def _endpoints_of(rows: Sequence[dict[str, Any]] | None) -> tuple[Endpoint, ...]:
+    return tuple(Endpoint(**row) for row in rows or ())
 
 
-def _match(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Iterator[MatchedLink]:
+def _match(file: YamlFile, link: DeclaredLink, nodes: Sequence[Node]) -> Iterator[MatchedLink]:
     chosen = _choose(file, link, nodes)
     received = {node: _received(file, link, node, nodes) for node in chosen}
     # A name or pattern may fit several nodes: it means only those that have these topics.
@@ -143,7 +119,7 @@ def _match(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Iterat
         yield MatchedLink(link.kind, node.process_id, inputs, outputs, link.line, link.depth)
 
 
-def _choose(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Sequence[Node]:
+def _choose(file: YamlFile, link: DeclaredLink, nodes: Sequence[Node]) -> Sequence[Node]:
     named = [node for node in nodes if matches(node.name, link.node.value)]
     if not named:
         names = [node.name for node in nodes]
@@ -176,7 +152,7 @@ def _choose(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> Seque
 
 
 def _received(
-    file: LinksFile, link: DeclaredLink, node: Node, nodes: Sequence[Node]
+    file: YamlFile, link: DeclaredLink, node: Node, nodes: Sequence[Node]
 ) -> tuple[Endpoint, ...]:
     """Return the subscriptions of a node, or of the nodes that receive for it in its process."""
     if link.inputs_of is None:
@@ -193,7 +169,7 @@ def _received(
     return tuple(endpoint for other in others for endpoint in other.subscriptions)
 
 
-def _refuse_repeated(file: LinksFile, link: DeclaredLink, nodes: Sequence[Node]) -> None:
+def _refuse_repeated(file: YamlFile, link: DeclaredLink, nodes: Sequence[Node]) -> None:
     """Raise if a name means several nodes, and the entry does not say which."""
     for node in nodes:
         same = [other for other in nodes if other.name == node.name]
@@ -224,7 +200,7 @@ def _means(text: Text, endpoint: Endpoint) -> bool:
 
 
 def _fail_on_topic(
-    file: LinksFile,
+    file: YamlFile,
     link: DeclaredLink,
     nodes: Sequence[Node],
     received: Mapping[Node, tuple[Endpoint, ...]],
@@ -248,7 +224,7 @@ def _fail_on_topic(
 
 
 def _fail_on_unknown_topic(
-    file: LinksFile, link: DeclaredLink, text: Text, topics: Sequence[str], *, is_input: bool
+    file: YamlFile, link: DeclaredLink, text: Text, topics: Sequence[str], *, is_input: bool
 ) -> NoReturn:
     if _is_pattern(link.node.value):
         who = f"no node that matches {link.node.value}"
@@ -263,7 +239,7 @@ def _fail_on_unknown_topic(
     )
 
 
-def _refuse_cycles(file: LinksFile, links: Sequence[MatchedLink]) -> None:
+def _refuse_cycles(file: YamlFile, links: Sequence[MatchedLink]) -> None:
     """Raise if messages would lead back to themselves through declared links."""
     links = [link for link in links if link.kind in INDIRECT_KINDS]
     before: dict[str, set[str]] = {}

@@ -10,8 +10,8 @@ from threading import Timer
 from typing import TYPE_CHECKING
 
 from msgflow.errors import RecordingError
-from msgflow.files.temporary_owner import mark
-from msgflow.record.session import Channel, recording_session, temporary_directory
+from msgflow.files.temporary_owner import mark, temporary_directory
+from msgflow.record.session import TEMPORARY, Channel, recording_session
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -64,7 +64,7 @@ def measure_event_cost(directory: Path, channel: Channel) -> None:
 def _measured(channel: Channel) -> float:
     only = Channel((_EVENT,), channel.sub_buffer_size, channel.sub_buffers)
     with (
-        temporary_directory() as directory,
+        temporary_directory(TEMPORARY) as directory,
         subprocess.Popen(
             [sys.executable, "-I", "-c", _MEASURE],
             stdin=subprocess.PIPE,

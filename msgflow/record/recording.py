@@ -18,7 +18,7 @@ from msgflow.record.lttng import losses, ros_processes, sessions
 from msgflow.record.profile import recorded_samples, with_python_functions
 from msgflow.record.program import Program, require_program
 from msgflow.record.python_path import with_python_nodes
-from msgflow.record.scheduling import recorded_with_perf, why_perf_cannot_record
+from msgflow.record.scheduling import recorded_with_perf
 from msgflow.record.session import (
     Channel,
     can_trace_kernel,
@@ -115,13 +115,7 @@ def record(
             measure_event_cost(directory, channel)
         by_lttng = kernel and can_trace_kernel()
         if kernel and not by_lttng:
-            if (reason := why_perf_cannot_record()) is None:
-                stack.enter_context(recorded_with_perf(directory, note))
-            else:
-                note(
-                    f"the scheduler is not recorded: LTTng cannot trace this kernel (it"
-                    f" needs its modules, and root or the group tracing), and {reason}"
-                )
+            stack.enter_context(recorded_with_perf(directory, note))
         if profile is not None:
             samples = recorded_samples(directory, profile, is_ours=bool(program), note=note)
             stack.enter_context(samples)

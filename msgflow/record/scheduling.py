@@ -44,7 +44,14 @@ def why_perf_cannot_record() -> str | None:
 
 @contextmanager
 def recorded_with_perf(directory: Path, note: Callable[[str], None]) -> Iterator[None]:
-    """Record the scheduler during the block, as a CTF trace below the directory."""
+    """Record the scheduler during the block, as a CTF trace below the directory, where perf can."""
+    if (reason := why_perf_cannot_record()) is not None:
+        note(
+            "the scheduler is not recorded: LTTng cannot trace this kernel (it needs its modules,"
+            f" and root or the group tracing), and {reason}"
+        )
+        yield
+        return
     # Not perf.data, which has samples of functions.
     data = directory / "perf.scheduler"
     with perf.recorded(data, _OPTIONS, note):

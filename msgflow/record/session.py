@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import shlex
-import shutil
-import tempfile
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import RecordingError, UsageError
-from msgflow.files.temporary_owner import is_abandoned, mark
+from msgflow.files.temporary_owner import is_abandoned, mark, remove_abandoned_directories
 from msgflow.record.lttng import is_daemon_running, lttng, sessions
 from msgflow.record.scheduling import KERNEL_EVENTS
 from msgflow.trace.regular_file import read_regular
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
 
 # Of ROS 2; of an instrumented DDS; of CARET; of Agnocast.
 EVENTS = ("ros2:*", "dds:*", "ros2_caret:*", "agnocast:*")
@@ -31,7 +29,8 @@ _CHANNEL = "ros2"
 # In the directory of a recording while it is made: the mark of its process.
 _OWNER = ".msgflow-record"
 _MOST_BYTES = 100
-_TEMPORARY = "msgflow-watch-"
+TEMPORARY = "msgflow-watch-"
+"""Begins the names of temporary directories beside recordings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,14 +84,6 @@ def recording_session(
 
 
 @contextmanager
-def temporary_directory() -> Iterator[Path]:
-    """Yield a directory, and remove it afterwards; after SIGKILL, `remove_leftovers` does."""
-    prefix = f"{_TEMPORARY}{mark()}."
-    with tempfile.TemporaryDirectory(prefix=prefix) as directory:
-        yield Path(directory)
-
-
-@contextmanager
 def rotated(name: str, length_ns: int) -> Iterator[Callable[[], None]]:
     """Let a session cut its recording into chunks during the block; one that does so goes on.
 
@@ -137,9 +128,7 @@ def remove_leftovers() -> list[str]:
         lttng("destroy", session.name)
         assert session.directory is not None
         (session.directory / _OWNER).unlink()
-    for directory in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*"):
-        if is_abandoned(directory.name.removeprefix(_TEMPORARY).rpartition(".")[0]):
-            shutil.rmtree(directory, ignore_errors=True)
+    remove_abandoned_directories(TEMPORARY)
     return [session.name for session in left]
 
 

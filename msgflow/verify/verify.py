@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import fnmatch
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from fnmatch import fnmatchcase
-from pathlib import Path
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -17,7 +17,8 @@ from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection, conditions_of
 from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import Slice
-from msgflow.sql.header import Column, Header, Param
+from msgflow.sql.header import Param
+from msgflow.sql.statement import internal_sql, registered
 from msgflow.text.name_suggestions import did_you_mean
 from msgflow.verify.condition import format_value
 from msgflow.verify.junit import junit_xml
@@ -29,9 +30,9 @@ if TYPE_CHECKING:
 
     import duckdb
 
-    from msgflow.files.yaml_file import Text
     from msgflow.run.choice import Run
     from msgflow.run.window import Window
+    from msgflow.sql.header import Header
     from msgflow.sql.value import Value
     from msgflow.verify.metrics import Metric
     from msgflow.verify.targets_file import Requirement, Target, TargetsFile
@@ -46,32 +47,6 @@ class Verdict(StrEnum):
     NO_DATA = "no data"
 
 
-_ORDER = (Verdict.FAILED, Verdict.NOT_MEASURED, Verdict.NO_DATA, Verdict.PASSED)
-_COLUMNS = (
-    Column("verdict", "VARCHAR", None, "'passed', 'failed', 'not measured' or 'no data'"),
-    Column("target", "VARCHAR", None, "What the file calls it"),
-    Column("subject", "VARCHAR", None, "What of the run it is; NULL: nothing there"),
-    Column("metric", "VARCHAR", None, "What is required"),
-    Column("condition", "VARCHAR", None, "As it was written"),
-    Column("measured", "VARCHAR", None, "What was measured, for people"),
-    Column("value", "DOUBLE", None, "What was measured, in `unit`"),
-    Column("unit", "VARCHAR", None, "'ns', 'Hz', 'share' (0 to 1) or 'count'"),
-    Column("samples", "BIGINT", None, "How many values it is from"),
-    Column("reason", "VARCHAR", None, "Why there is no value, or why it may be wrong"),
-    Column("worst_ns", "BIGINT", "ns", "The worst case of what is too long or lost"),
-    Column("worst_at_ns", "BIGINT", "epoch ns", "When that began"),
-    Column("see", "VARCHAR", None, "The command that shows it"),
-    Column("line", "BIGINT", None, "Line of the file"),
-    Column("path", "VARCHAR", None, "Nodes and topics of a path"),
-)
-_HEADER = Header(
-    name="verify", title="Requirements", description="Whether a run meets its requirements.",
-    grain="one row per requirement and thing that it is of", kind="view", params=(),
-    columns=_COLUMNS, severity=None, cause=None, cure=None, note=None, body="",
-    path=Path(),
-    brief=("verdict", "subject", "metric", "condition", "measured", "reason", "worst_ns", "see",
-           "worst_at_ns", "target", "samples", "line", "path", "value"),
-)  # fmt: skip
 _LOST = "SELECT sum(discarded_event_count)::BIGINT FROM main.trace WHERE run_id = $run_id"
 
 
@@ -145,20 +120,18 @@ def verify(
     rows = [
         row
         for place, target in enumerate(targets.targets)
-        for row in (
-            work.missing(target, vanished[place]) if place in vanished else work.rows(target)
-        )
+        for row in work.rows(target, vanished.get(place))
     ]
-    # Failures come first; otherwise the order of the file stays.
-    rows.sort(key=lambda row: _ORDER.index(row["verdict"]))
+    header = replace(internal_sql().header("requirement_verdict"), name="verify")
     types = {"VARCHAR": pa.string(), "DOUBLE": pa.float64(), "BIGINT": pa.int64()}
-    schema = pa.schema([(column.name, types[column.type]) for column in _COLUMNS])
+    schema = pa.schema([(column.name, types[column.type]) for column in header.columns])
+    with registered(connection, judged=pa.Table.from_pylist(rows, schema=schema)):
+        table = internal_sql().run(connection, "requirement_verdict", {}).to_arrow_table()
     notes = list(work.notes)
     lost = connection.execute(_LOST, {"run_id": one.run_id}).fetchall()[0][0]
     if lost:
         notes.append(f"the trace lost {lost:,} events, so that values may be wrong: msgflow check")
-    table = pa.Table.from_pylist(rows, schema=schema)
-    return Verification(QueryResult(table, _HEADER, (one,), notes), one, str(targets.file.path))
+    return Verification(QueryResult(table, header, (one,), notes), one, str(targets.file.path))
 
 
 @dataclass
@@ -170,7 +143,13 @@ class _Work:
     case: str
     notes: dict[str, None] = field(default_factory=dict)
 
-    def rows(self, target: Target) -> Iterator[dict[str, Any]]:
+    def rows(self, target: Target, vanished: str | None) -> Iterator[dict[str, Any]]:
+        """Yield the verdicts on a target; `vanished` says what of it the run does not have."""
+        if vanished is not None:
+            for requirement in target.requirements:
+                row = {"verdict": Verdict.NOT_MEASURED, "reason": vanished}
+                yield self._verdict(target, requirement) | row
+            return
         metrics = SUBJECTS[target.kind].metrics
         asked: dict[str, list[Requirement]] = {}
         for requirement in target.requirements:
@@ -192,7 +171,8 @@ class _Work:
         columns = [f"{subject.label[name]} AS subject"]
         for place, requirement in enumerate(requirements):
             metric = subject.metrics[requirement.metric]
-            value = metric.value.format(requirement.condition.statistic)
+            statistic = requirement.condition.statistic
+            value = metric.value.format(statistic, samples=metric.samples)
             key = KEYS[metric.worst] if metric.worst else "NULL"
             columns.append(f"({value})::DOUBLE AS value_{place}")
             columns.append(f"({metric.samples})::BIGINT AS samples_{place}")
@@ -226,7 +206,7 @@ class _Work:
         return where, {f"wanted_{field}": text.value for field, text in target.chosen.items()}
 
     @staticmethod
-    def _matches(header: Header, field: str, columns: tuple[str, ...]) -> str:
+    def _matches(header: Header, field: str, columns: Sequence[str]) -> str:
         is_named = " OR ".join(f"{column} = $wanted_{field}" for column in columns)
         is_meant = " OR ".join(f"{column} GLOB $wanted_{field}" for column in columns)
         if any(column.name == "is_internal" for column in header.columns):
@@ -305,12 +285,6 @@ class _Work:
             "reason": metric.lacking or reason,
         }
 
-    def missing(self, target: Target, reason: str) -> Iterator[dict[str, Any]]:
-        """Yield 'not measured' for each requirement on something that the run does not have."""
-        for requirement in target.requirements:
-            row = {"verdict": Verdict.NOT_MEASURED, "reason": reason}
-            yield self._missing(target, requirement) | row
-
     @staticmethod
     def _verdict(target: Target, requirement: Requirement) -> dict[str, Any]:
         return {
@@ -338,31 +312,25 @@ def _without_value(metric: Metric) -> Verdict:
 def _vanished(connection: duckdb.DuckDBPyConnection, file: TargetsFile, run: Run) -> dict[int, str]:
     """Return why targets cannot be measured, by place: a name that nothing in the run has."""
     topics = SUBJECTS["topic"].filters["topic"]
-    known: dict[str, list[str]] = {}
 
+    @cache
     def names(sql: str) -> list[str]:
-        if sql not in known:
-            rows = connection.execute(sql, {"run_id": run.run_id}).fetchall()
-            known[sql] = sorted(name for (name,) in rows if name is not None)
-        return known[sql]
+        rows = connection.execute(sql, {"run_id": run.run_id}).fetchall()
+        return sorted(name for (name,) in rows if name is not None)
 
     found: dict[int, str] = {}
-
-    def require(place: int, text: Text, sql: str, what: str, *, is_exact: bool) -> None:
-        there = names(sql)
-        if text.value in there or (
-            not is_exact and any(fnmatchcase(name, text.value) for name in there)
-        ):
-            return
-        more = f" and {len(there) - 5} more" if len(there) > 5 else ""
-        some = f"it has {', '.join(there[:5])}{more}" if there else f"it has no {what} at all"
-        hint = did_you_mean(text.value, there, some)
-        found.setdefault(place, f"the run has no such {what} — {text.value}; {hint}")
-
     for place, target in enumerate(file.targets):
-        for topic in target.topics:
-            require(place, topic, topics.names, topics.what, is_exact=True)
-        for word, text in target.chosen.items():
-            one = SUBJECTS[target.kind].filters[word]
-            require(place, text, one.names, one.what, is_exact=False)
+        filters = SUBJECTS[target.kind].filters
+        wanted = [(text, topics) for text in target.topics]
+        wanted += [(text, filters[word]) for word, text in target.chosen.items()]
+        for text, one in wanted:
+            there = names(one.names)
+            # Topics of a path are no patterns.
+            is_pattern = text not in target.topics
+            if text.value in there or (is_pattern and fnmatch.filter(there, text.value)):
+                continue
+            more = f" and {len(there) - 5} more" if len(there) > 5 else ""
+            some = f"{', '.join(there[:5])}{more}" if there else f"no {one.what} at all"
+            hint = did_you_mean(text.value, there, f"it has {some}")
+            found.setdefault(place, f"the run has no such {one.what} — {text.value}; {hint}")
     return found

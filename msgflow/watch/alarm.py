@@ -10,13 +10,14 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.query.why import explain
 from msgflow.run.slice import Slice
+from msgflow.sql.statement import internal_sql, registered
 from msgflow.text.values import format_duration
 from msgflow.verify.metrics import ENDS
 from msgflow.verify.verify import Verdict, verify
 from msgflow.verify.worst_case import take_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     import duckdb
 
@@ -25,33 +26,10 @@ if TYPE_CHECKING:
 
 Row = dict[str, Any]
 
-# By the activity of a piece of a flow, see the query critical-path.
-_BLAME = {
-    "callback": "{node} ran {time}",
-    "network_or_idle": "{what} was on its way for {time}",
-    "executor_busy": "kept waiting {time} by {node}, which ran {what}",
-    "all_threads_busy": "kept waiting {time} for a thread, one ran {what} of {node}",
-    "blocked": "kept waiting {time} by {what} of {node}, which excludes it",
-    "undecided": "{node} did not take it for {time}",
-    "take_to_callback": "{node} took it {time} before it used it",
-    "timer": "{node} waited {time} for its timer",
-    "unpublished": "{node} waited {time} for {what}",
-}
-# What a callback did, by the state of its thread where the kernel was traced; else it ran.
-_BLAME_OF_STATE = {
-    "preempted": "{node} waited {time} for a CPU that {who} had",
-    "runnable": "{node} waited {time} for a CPU",
-    "sleeping": "{node} slept {time}",
-    "uninterruptible": "{node} waited {time} for a page or a disk",
-}
 # What is said of the causes of what fails: of its worst case, and of the whole window.
 _CAUSES = ("culprit", "why")
-_OTHER = "{node} spent {time} on {activity}"
 # A requirement has the first of these that a window gave it.
 _STRONGEST = (Verdict.FAILED, Verdict.PASSED, Verdict.NO_DATA, Verdict.NOT_MEASURED)
-# A piece that took a smaller part of the latency is not to blame.
-_LEAST_SHARE = 0.2
-_MOST_PIECES = 2
 
 
 @dataclass(frozen=True)
@@ -177,11 +155,13 @@ class Alarm:
 
     @staticmethod
     def _violation(con: duckdb.DuckDBPyConnection, row: Row, part: Slice, final_ns: int) -> Row:
-        take_id = take_of(row["see"])
-        pieces: list[Row] = []
+        take_id, culprit = take_of(row["see"]), None
         if take_id is not None:
             asked = {"take": take_id, **_ends(row["path"])}
-            pieces = run_query(con, load_query("critical-path"), asked, part).table.to_pylist()
+            pieces = run_query(con, load_query("critical-path"), asked, part).table
+            with registered(con, piece=pieces):
+                asked = {"path": row["path"]}
+                ((culprit,),) = internal_sql().run(con, "blamed", asked).fetchall()
         at_ns = row["worst_at_ns"]
         return {
             "subject": row["subject"] or row["target"],
@@ -192,7 +172,7 @@ class Alarm:
             "worst_ns": row["worst_ns"],
             "at_ns": at_ns,
             "is_final": at_ns is None or at_ns < final_ns,
-            "culprit": ", ".join(blamed(pieces, row["path"])) or None,
+            "culprit": culprit,
         }
 
 
@@ -236,33 +216,8 @@ def violation_line(violation: Row) -> str:
     return words if violation["is_final"] else f"{words} (provisional)"
 
 
-def blamed(pieces: Sequence[Row], path: str | None) -> Iterator[str]:
-    """Yield what took longest of a flow."""
-    slowest = sorted(pieces, key=lambda piece: -piece["duration_ns"])
-    for piece in slowest[:_MOST_PIECES]:
-        if piece["activity"] != "rest" and (piece["share"] or 0) >= _LEAST_SHARE:
-            words = _BLAME.get(piece["activity"], _OTHER)
-            if piece["activity"] == "callback":
-                words = _BLAME_OF_STATE.get(piece["state"] or "", words)
-                if piece["wakers"]:
-                    words = "{node} waited {time} for {who}"
-            yield words.format(
-                node=piece["node"] or _sender(piece["hop"], path) or "an unknown node",
-                what=piece["what"] or "a message",
-                who=piece["who"] or "another thread",
-                activity=piece["activity"].replace("_", " "),
-                time=format_duration(piece["duration_ns"]),
-            )
-
-
 def _ends(path: str | None) -> Row:
     """Return the topics between which a flow counts: a target may be part of a longer path."""
     topics = (path or "").split(" → ")[1:-1]
     ends = {"from": topics[:1], "to": topics[-1:]} if topics else {}
     return {word: named for word, named in ends.items() if named[0].startswith("/")}
-
-
-def _sender(hop: int | None, path: str | None) -> str | None:
-    """Return the node that sends a message of a path: rclpy does not record its callbacks."""
-    nodes = (path or "").split(" → ")[::2]
-    return nodes[hop - 1] if hop is not None and 0 < hop <= len(nodes) else None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -163,11 +162,6 @@ def finished_chunks(directory: Path) -> list[Chunk]:
         raise error
 
     return ChunkFinder(directory, refuse).further(is_last=True)
-
-
-def remove_chunk(path: Path) -> None:
-    """Remove a chunk from the disk; its session goes on."""
-    shutil.rmtree(path, ignore_errors=True)
 
 
 def _read(path: Path) -> _Found | None:

@@ -30,21 +30,16 @@ MOST_LABELS = 1_000
 """Paths, subscriptions that lost messages, and violated targets that metrics have at most."""
 
 _SECOND_NS = 1_000_000_000
-_STATUSES = "SELECT path, status, count(*) FROM watched_flow GROUP BY ALL"
 # Where clocks are apart, latencies may be negative: a sum that falls would be no counter.
-_SUMS = """
-SELECT path, sum(greatest(latency_ns, 0))::BIGINT
+_PATHS = """
+SELECT
+    path, histogram(status), sum(greatest(latency_ns, 0))::BIGINT, count(latency_ns),
+    list_transform(
+        $bounds, lambda bound: len(list_filter(list(latency_ns), lambda ns: ns <= bound * 1e9))
+    )
 FROM watched_flow
-WHERE latency_ns IS NOT NULL
-GROUP BY ALL
+GROUP BY path
 """
-_BUCKETS = """
-SELECT f.path, b.bound, count(*) FILTER (f.latency_ns <= b.bound * 1e9)
-FROM watched_flow AS f, unnest($bounds) AS b (bound)
-WHERE f.latency_ns IS NOT NULL
-GROUP BY ALL
-"""
-_COUNTS = "SELECT path, count(latency_ns) FROM watched_flow GROUP BY ALL"
 _LOSSES = """
 SELECT s.topic_name, main.node_label(n.full_name, p.name, p.pid), d.status, d.reason, count(*)
 FROM main.stat_delivery AS d
@@ -64,10 +59,9 @@ class Exporter:
     def __init__(self) -> None:
         # The server reads in threads of its own.
         self._lock = Lock()
-        self._statuses: Counter[tuple[str, str]] = Counter()
-        self._buckets: Counter[tuple[str, float]] = Counter()
-        self._counts: Counter[str] = Counter()
-        self._sums_ns: Counter[str] = Counter()
+        # By path, the last seen last: flows by status; of latencies their sum [ns], their number,
+        # and how many are in each bucket.
+        self._paths: dict[str, tuple[Counter[str], list[int]]] = {}
         self._losses: Counter[tuple[str, ...]] = Counter()
         self._violations: Counter[tuple[str, ...]] = Counter()
         self._discarded = 0
@@ -105,18 +99,14 @@ class Exporter:
         flows = run_query(con, load_query("flows"), {}, times).table
         losses = con.execute(_LOSSES, part.bindings).fetchall()
         with registered(con, watched_flow=flows):
-            statuses = con.execute(_STATUSES).fetchall()
-            sums = con.execute(_SUMS).fetchall()
-            counts = con.execute(_COUNTS).fetchall()
-            buckets = con.execute(_BUCKETS, {"bounds": list(BOUNDS_S)}).fetchall()
+            paths = con.execute(_PATHS, {"bounds": list(BOUNDS_S)}).fetchall()
         discarded = discarded_events(con, part)
         with self._lock:
-            self._statuses.update({(path, status): number for path, status, number in statuses})
-            self._sums_ns.update(dict(sums))
-            for path, number in counts:
-                # What was seen last comes last.
-                self._counts[path] = self._counts.pop(path, 0) + number
-            self._buckets.update({(path, bound): number for path, bound, number in buckets})
+            for path, statuses, total_ns, number, buckets in paths:
+                further = [total_ns, number, *buckets]
+                known, before = self._paths.pop(path, (Counter(), [0] * len(further)))
+                known.update(statuses)
+                self._paths[path] = known, [sum(pair) for pair in zip(before, further, strict=True)]
             for *labels, number in losses:
                 self._losses[tuple(labels)] = self._losses.pop(tuple(labels), 0) + number
             self._discarded += discarded
@@ -124,16 +114,9 @@ class Exporter:
 
     def _forget(self) -> None:
         """Drop the labels that were seen longest ago: restarts make new ones, for ever."""
-        gone = [*self._counts][: max(len(self._counts) - MOST_LABELS, 0)]
-        for path in gone:
-            del self._counts[path], self._sums_ns[path]
-            for status in [key for key in self._statuses if key[0] == path]:
-                del self._statuses[status]
-            for bound in BOUNDS_S:
-                del self._buckets[path, bound]
-        for counter in (self._losses, self._violations):
-            for labels in [*counter][: max(len(counter) - MOST_LABELS, 0)]:
-                del counter[labels]
+        for known in (self._paths, self._losses, self._violations):
+            for labels in [*known][: max(len(known) - MOST_LABELS, 0)]:
+                del known[labels]
 
     def show(self, report: WindowReport) -> None:
         """Take over how it is now."""
@@ -157,20 +140,23 @@ class Exporter:
         latency = HistogramMetricFamily(
             "msgflow_path_latency_seconds", "Latency from end to end", labels=["path"]
         )
-        for path, number in self._counts.items():
-            buckets = [(str(bound), self._buckets[path, bound]) for bound in BOUNDS_S]
-            latency.add_metric(
-                [path], [*buckets, ("+Inf", number)], self._sums_ns[path] / _SECOND_NS
-            )
+        for path, (_, (total_ns, number, *counts)) in self._paths.items():
+            buckets = list(zip(map(str, BOUNDS_S), counts, strict=True))
+            latency.add_metric([path], [*buckets, ("+Inf", number)], total_ns / _SECOND_NS)
         yield latency
 
     def _counters(self) -> Iterator[Metric]:
         from prometheus_client.core import CounterMetricFamily
 
+        statuses = {
+            (path, status): number
+            for path, (known, _) in self._paths.items()
+            for status, number in known.items()
+        }
         for name, meaning, labels, counted in (
             (
                 "msgflow_path_flows", "Flows by what became of them",
-                ["path", "status"], self._statuses,
+                ["path", "status"], statuses,
             ),
             (
                 "msgflow_messages_undelivered", "Messages that a subscription did not get",

@@ -5,6 +5,8 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any
 
+import duckdb
+import pyarrow as pa
 import pytest
 from hypothesis import example, given
 from hypothesis.strategies import text
@@ -13,6 +15,7 @@ from ruamel.yaml import YAML
 from msgflow.files.yaml_file import in_quotes, list_lines, quoted
 from msgflow.links.suggested_links import LinkSuggestions
 from msgflow.paths.suggested_paths import suggest_paths
+from msgflow.query.catalogue import load_query
 from msgflow.verify.suggested_targets import QUERIES, suggest_targets
 
 # They end a line of YAML, end a comment, or are not allowed: what follows is a stranger's.
@@ -30,6 +33,16 @@ HOSTILE = [
 
 def read(content: str) -> Any:
     return YAML(typ="safe", pure=True).load(content)
+
+
+def result(query: str, values: dict[str, Any] | None) -> pa.Table:
+    """Return a result of a query: with one row that has these values, or none."""
+    columns = load_query(query).columns
+    row = {column.name: (values or {}).get(column.name) for column in columns}
+    listed = ", ".join(
+        f"${name}::{column.type} AS {name}" for name, column in zip(row, columns, strict=True)
+    )
+    return duckdb.sql(f"SELECT {listed} LIMIT {int(bool(values))}", params=row).to_arrow_table()
 
 
 @given(text())
@@ -57,20 +70,13 @@ def test_suggestions_are_read_with_the_names_that_they_hold(name: str) -> None:
     (named,) = read(suggest_paths([path]))["paths"]
     assert (named["from"], named["to"]) == (f"/in{name}", "/out")
 
-    results: dict[str, list[dict[str, Any]]] = {query: [] for query in QUERIES}
-    service = {"service_name": name, "answered": 99, "round_trip_p99_ns": 10**6}
-    results |= {
-        "service-latency": [service],
-        "topics-delivery": [
-            {
-                "topic_name": name,
-                "subscriber": name,
-                "delivered_percent": 1,
-                "dropped": 1,
-                "lost": 1,
-            }
-        ],
-    }
+    given = {
+        "service-latency": {"service_name": name, "answered": 99, "round_trip_p99_ns": 10**6},
+        "topics-delivery": {
+            "topic_name": name, "subscriber": name, "delivered_percent": 1, "dropped": 1, "lost": 1,
+        },
+    }  # fmt: skip
+    results = {query: result(query, given.get(query)) for query in QUERIES}
     run: Any = SimpleNamespace(name=name)
     (target,) = read(suggest_targets(run, results, 0.1))["targets"]
     # Brackets make a pattern of them: one that means themselves.

@@ -41,7 +41,7 @@ def written(
     """A lake with all files of both, and what `run` is to have of each, without a commit."""
 
     def make(path: Path) -> None:
-        lake = Lake.open_or_create(path.parent / "lake")
+        lake = Lake.open(path.parent / "lake", create=True)
         parts = []
         for database in databases:
             with Database(database) as opened:

@@ -10,7 +10,6 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -23,35 +22,33 @@ from msgflow.cli.app import app
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet import ingest as fleet_ingest_module
 from msgflow.fleet import task_process, workers
-from msgflow.fleet.failure import read_failures
 from msgflow.fleet.file_store import Store, normal_url
-from msgflow.fleet.ingest import FleetProgress, Options, fleet_ingest, is_in_shard
+from msgflow.fleet.ingest import FleetProgress, fleet_ingest, is_in_shard
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import new_part
 from msgflow.fleet.pack import pack
 from msgflow.fleet.recording import look_at
-from msgflow.fleet.task import Outcome, Task
+from msgflow.fleet.task import Options, Outcome, Task
 
 BROKEN = "broken"
 
 
-def run_task(given: dict[str, Any]) -> dict[str, Any]:
+def run_task(task: Task) -> Outcome:
     """Return what a worker would say, without doing anything."""
-    task = Task(**given)
     key = (Path(task.source) / "packets").read_text()
     if key == BROKEN:
-        return asdict(Outcome(reason="broken", stage="ingesting", error="no trace"))
+        return Outcome(reason="broken", stage="ingesting", error="no trace")
     values = {
         "run": key,
         "part": new_part(key),
         "name": Path(task.source).name,
         "source": task.source,
         "source_signature": look_at(task.source).signature,
-        "options": json.dumps(task.options, sort_keys=True),
+        "options": json.dumps(task.ingest, sort_keys=True),
         "event_count": 1,
         "schema_revision": "",
     }
-    return asdict(Outcome(values=values))
+    return Outcome(values=values)
 
 
 @pytest.fixture(autouse=True)
@@ -94,7 +91,7 @@ def labels_of(run: str) -> dict[str, str]:
 
 
 def failures() -> dict[str, str]:
-    rows = read_failures(Lake.open("lake")).to_pylist()
+    rows = Lake.open("lake").failures().to_pylist()
     return {Path(row["source"]).name: row["reason"] for row in rows}
 
 
@@ -131,7 +128,7 @@ def test_equal_packets_with_other_labels_are_said_where_runs_are_replaced(place:
     for replace in (True, False):
         ingest("night.csv", replace=replace)
         assert failures() == {"b": "same_packets"}
-        (failed,) = read_failures(Lake.open("lake")).to_pylist()
+        (failed,) = Lake.open("lake").failures().to_pylist()
         assert f"from {place / 'a'}" in failed["error"]
         assert (runs(), labels_of("first")) == ({"first": "a"}, {"robot": "A"})
     # Of different calls, the later one is meant.
@@ -297,7 +294,7 @@ def test_a_pack_is_refused_while_others_write(place: Path) -> None:
 def test_scratch_space_that_cannot_be_made_is_not_full(place: Path) -> None:
     Path("file").write_text("")
     task = Task(0, str(place), str(place / "lake"), scratch=str(place / "file"))
-    found = Outcome(**task_process.run_task(asdict(task)))
+    found = task_process.run_task(task)
     assert (found.reason, found.stage) == ("no_scratch", "making scratch space")
 
 
@@ -372,13 +369,13 @@ def test_no_order_of_shards_matters(place: Path, labels: dict[str, str]) -> None
         else:
             ingest("night.csv")
         lake = Lake.open("lake")
-        found.append((table(lake.runs()), table(read_failures(lake))))
+        found.append((table(lake.runs()), table(lake.failures())))
         assert runs() == {"first": "a"}
     assert found[0] == found[1] == found[2]
     # A restart changes nothing, of whichever shard.
     for order in ((0, 1), (1, 0)):
         shards("night.csv", order=order)
-        assert (table(lake.runs()), table(read_failures(lake))) == found[0]
+        assert (table(lake.runs()), table(lake.failures())) == found[0]
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])

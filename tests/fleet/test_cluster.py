@@ -27,7 +27,6 @@ from fleet_cluster import (
 from object_store import KEYS, ObjectStore, object_store
 
 from msgflow import Database
-from msgflow.fleet.failure import read_failures
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.part import write_part
 from msgflow.fleet.workers import LOCAL, RayWorkers
@@ -102,13 +101,13 @@ def test_much_goes_wrong(
     lake = Lake.open(LAKE)
     runs = lake.runs().to_pylist()
     assert sorted(run["name"] for run in runs) == [f"r{number}" for number in range(GOOD)]
-    if [row["reason"] for row in read_failures(lake).to_pylist()] == ["unreachable"]:
+    if [row["reason"] for row in lake.failures().to_pylist()] == ["unreachable"]:
         # Looking at it was refused too often: the next call looks again.
         start_ingest(SOURCES, LAKE, cluster.address, scratch).communicate(timeout=300)
-    assert [row["reason"] for row in read_failures(lake).to_pylist()] == ["broken"]
+    assert [row["reason"] for row in lake.failures().to_pylist()] == ["broken"]
 
     # Row for row what each gives alone, on this machine.
-    other = Lake.open_or_create(tmp_path / "lake")
+    other = Lake.open(tmp_path / "lake", create=True)
     for run in runs:
         database = tmp_path / f"{run['name']}.duckdb"
         ingest([recordings / run["name"]], database)

@@ -30,7 +30,7 @@ Z95 = statistics.NormalDist().inv_cdf(0.975)
 
 def fill(folder: Path, runs: Iterable[tuple[Mapping[str, str], Mapping[str, float]]]) -> Lake:
     """Write a lake of runs: the labels of each, and the median of each of its paths [ms]."""
-    lake = Lake.open_or_create(folder / "lake")
+    lake = Lake.open(folder / "lake", create=True)
     rows = []
     flows: list[dict[str, Any]] = []
     paths: list[dict[str, Any]] = []

@@ -9,7 +9,7 @@ import signal
 import stat
 import sys
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -24,13 +24,12 @@ from msgflow import Database
 from msgflow.cli.app import app
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet import child_process, task_process
-from msgflow.fleet.failure import read_failures
-from msgflow.fleet.ingest import Options, fleet_ingest
+from msgflow.fleet.ingest import fleet_ingest
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import database_path, part_of, part_path
 from msgflow.fleet.pack import pack
 from msgflow.fleet.recording import State
-from msgflow.fleet.task import PASSING, Outcome, Task, needs, without_secrets
+from msgflow.fleet.task import PASSING, Options, Outcome, Task, needs, without_secrets
 from msgflow.fleet.workers import OneProcess
 from msgflow.sql.failure import out_of_memory
 from msgflow_sim import simulate
@@ -86,7 +85,7 @@ def filled(databases: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactor
 
 
 def failures(lake: Path) -> dict[str, dict[str, Any]]:
-    rows = read_failures(Lake.open(lake)).to_pylist()
+    rows = Lake.open(lake).failures().to_pylist()
     return {Path(row["source"]).name: row for row in rows}
 
 
@@ -178,9 +177,9 @@ def test_started_again_it_does_what_is_left(filled: Filled, tmp_path: Path) -> N
 def test_what_was_mended_is_tried_again(
     filled: Filled, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def here(given: dict[str, Any]) -> dict[str, Any]:
+    def here(task: Task) -> Outcome:
         with TemporaryDirectory() as directory:
-            return asdict(child_process.do(Task(**given), Path(directory)))
+            return child_process.do(task, Path(directory))
 
     # That each has a process of its own is shown by the other tests.
     monkeypatch.setattr("msgflow.fleet.workers.run_task", here)
@@ -196,7 +195,7 @@ def test_what_was_mended_is_tried_again(
     mended = run("ingest", *sources)
     assert mended.exit_code == 0, mended.stderr
     assert str(recordings / "broken") not in {
-        row["source"] for row in read_failures(Lake.open(lake)).to_pylist()
+        row["source"] for row in Lake.open(lake).failures().to_pylist()
     }
     # The source of a run that holds something else now takes the place of that run.
     (first,) = (r for r in Lake.open(lake).runs().to_pylist() if r["name"] == "broken")
@@ -223,17 +222,17 @@ def task(filled: Filled) -> Task:
 
 
 def outcome(task: Task, **more: Any) -> Outcome:
-    return Outcome(**task_process.run_task({**asdict(task), **more}))
+    return task_process.run_task(replace(task, **more))
 
 
 def test_what_hangs_or_grows_is_ended(task: Task, tmp_path: Path) -> None:
     late = outcome(task, timeout=0.2, scratch=str(tmp_path))
     assert (late.reason, late.values) == ("timeout", None)
     assert late.error.startswith("not done after 0.2 s")
-    large = outcome(task, most_memory=20_000_000, scratch=str(tmp_path))
+    large = outcome(task, memory=20_000_000, scratch=str(tmp_path))
     assert large.reason == "too_large"
     assert "may take 20,000,000" in large.error
-    full = outcome(task, disk=10**18, scratch=str(tmp_path))
+    full = outcome(task, needed_disk=10**18, scratch=str(tmp_path))
     assert (full.reason, full.stage) == ("no_space", "looking at the source")
     no_folder = tmp_path / "file"
     no_folder.write_text("")
@@ -268,9 +267,7 @@ def test_a_source_that_changes_while_it_is_read(
 
     monkeypatch.setattr(child_process, "look_at", then_it_grows)
     (tmp_path / "scratch").mkdir()
-    changed = child_process.do(
-        Task(**{**asdict(task), "source": str(source)}), tmp_path / "scratch"
-    )
+    changed = child_process.do(replace(task, source=str(source)), tmp_path / "scratch")
     assert (changed.reason, changed.stage) == ("changed", "looking at the source again")
 
 
@@ -327,7 +324,7 @@ def test_what_may_pass_is_tried_again(
         done = fleet_ingest([source], lake, options=Options(pause=0.01))
         assert [reason for _, reason, _ in done.failures] == failed
         assert len(workers.tasks) == tries
-        (row,) = read_failures(Lake.open(lake)).to_pylist()
+        (row,) = Lake.open(lake).failures().to_pylist()
         assert row["tries"] == tries
         # Left alone, until somebody asks for it.
         assert fleet_ingest([source], lake).failed_before == 1

@@ -39,7 +39,7 @@ def write(lake: Lake, database: Path, scratch: Path) -> Row:
 
 @pytest.fixture
 def lake(tmp_path: Path) -> Lake:
-    return Lake.open_or_create(tmp_path / "lake")
+    return Lake.open(tmp_path / "lake", create=True)
 
 
 @pytest.fixture
@@ -194,7 +194,7 @@ def test_what_is_no_lake_is_refused(tmp_path: Path) -> None:
         Lake.open(tmp_path / "nothing")
     (tmp_path / "file").write_text("mine")
     with pytest.raises(DatabaseError, match="something else than a lake"):
-        Lake.open_or_create(tmp_path)
+        Lake.open(tmp_path, create=True)
     assert sorted(tmp_path.iterdir()) == [tmp_path / "file"]
     for text, words in (
         ('{"format": "msgflow lake", "revision": 3}', "newer than this msgflow knows"),
@@ -203,9 +203,9 @@ def test_what_is_no_lake_is_refused(tmp_path: Path) -> None:
         ("[]", "not that of a lake"),
     ):
         (tmp_path / "lake.json").write_text(text)
-        for opened in (Lake.open, Lake.open_or_create):
+        for create in (False, True):
             with pytest.raises(DatabaseError, match=words):
-                opened(tmp_path)
+                Lake.open(tmp_path, create=create)
 
 
 def test_a_damaged_row_of_runs_is_said(lake: Lake) -> None:

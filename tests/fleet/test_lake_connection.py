@@ -62,7 +62,7 @@ def test_a_condition_that_is_none(night: Lake, where: str, words: str) -> None:
 
 
 def test_a_label_called_like_a_column_is_not_mistaken(tmp_path: Path) -> None:
-    lake = Lake.open_or_create(tmp_path / "lake")
+    lake = Lake.open(tmp_path / "lake", create=True)
     with pytest.raises(UsageError, match="no run yet"):
         choose(lake)
     base = {"schema_revision": "1"}
@@ -155,7 +155,7 @@ def test_all_tables_are_there_and_rows_of_runs_that_count(night: Lake) -> None:
 
 
 def test_a_damaged_file_is_said(tmp_path: Path) -> None:
-    lake = Lake.open_or_create(tmp_path / "lake")
+    lake = Lake.open(tmp_path / "lake", create=True)
     lake.commit([{"run": "1", "part": "1-x"}])
     # A table without files is not there.
     with Reading(choose(lake), ["flow"]) as reading, pytest.raises(duckdb.CatalogException):

@@ -186,7 +186,7 @@ def test_reasons_and_shares_are_of_sums(night: Lake) -> None:
 @pytest.mark.thorough
 def test_goals_of_several_runs_are_added_up(tmp_path: Path) -> None:
     """Quantiles are the largest of any run; the goals themselves are in the views of each run."""
-    lake, commits, alone = Lake.open_or_create(tmp_path / "lake"), [], []
+    lake, commits, alone = Lake.open(tmp_path / "lake", create=True), [], []
     for seed in (0, 1):
         recording, path = tmp_path / f"r{seed}", tmp_path / f"{seed}.duckdb"
         simulate("actions", recording, factor=0.2, seed=seed)
@@ -341,7 +341,7 @@ def test_the_worst_flows_come_with_what_opens_them(night: Lake) -> None:
 
 
 def test_a_lake_of_an_earlier_version_lacks_tables(night: Lake, tmp_path: Path) -> None:
-    lake = Lake.open_or_create(tmp_path / "lake")
+    lake = Lake.open(tmp_path / "lake", create=True)
     row = night.runs().to_pylist()[0]
     lake.commit([row | {"labels": dict(row["labels"] or ()), "msgflow_version": "0.0.1"}])
     with pytest.raises(UsageError, match="an earlier msgflow wrote them — topics_delivery"):

@@ -60,7 +60,7 @@ def test_runs_that_cannot_be_opened(night: Lake, tmp_path: Path) -> None:
 
 @pytest.mark.thorough
 def test_what_is_not_the_database_of_the_run_is_refused(night: Lake, tmp_path: Path) -> None:
-    lake = Lake.open_or_create(tmp_path / "lake")
+    lake = Lake.open(tmp_path / "lake", create=True)
     rows = {row["name"]: row for row in night.runs().to_pylist()}
     other = night.store.read(database_path(rows["second"]["database_part"]))
     assert other is not None

@@ -15,7 +15,6 @@ from typer.testing import CliRunner
 from msgflow import Database
 from msgflow.cli.app import app
 from msgflow.errors import UsageError
-from msgflow.fleet.failure import write_failure
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_page import lake_page, write_lake_page
 from msgflow.fleet.lake_query import fleet_query
@@ -31,7 +30,7 @@ def lake(simulated: Callable[..., Path], tmp_path_factory: pytest.TempPathFactor
     """Runs of ten days, one of them three times as slow, with labels and names that are hostile."""
     folder = tmp_path_factory.mktemp("lake")
     database = simulated("pipeline", 0.01)
-    lake = Lake.open_or_create(folder / "lake")
+    lake = Lake.open(folder / "lake", create=True)
     with Database(database) as opened:
         part = write_part(opened.connection, database, lake.store, folder)
     rows = [
@@ -51,8 +50,7 @@ def lake(simulated: Callable[..., Path], tmp_path_factory: pytest.TempPathFactor
     ]
     lake.commit(rows)
     for text in HOSTILE:
-        write_failure(
-            lake,
+        lake.write_failure(
             {"source": text, "labels": {"robot": text}, "reason": "broken", "error": text,
              "stage": text, "hint": text, "tries": 1},
         )  # fmt: skip

@@ -26,7 +26,7 @@ from msgflow.run.window import Window
 from msgflow.trace import Continuation
 from msgflow.verify.targets_file import TargetsFile
 from msgflow.verify.verify import Verdict
-from msgflow.watch.alarm import Alarm, blamed
+from msgflow.watch.alarm import Alarm
 from msgflow.watch.chunk import Chunk
 from msgflow.watch.flight_recorder import FlightRecorder
 from msgflow.watch.kept_chunk import read_chunk
@@ -284,29 +284,6 @@ def test_an_error_of_the_targets_is_told_as_it_is(watched, monkeypatch) -> None:
 def test_without_a_window_nothing_is_measured(watched, monkeypatch) -> None:
     monkeypatch.setattr("msgflow.watch.follow.watch_finished", lambda place, watcher: iter(()))
     assert watched(TARGETS).exit_code == 5
-
-
-@pytest.mark.parametrize(
-    ("wakers", "state", "who", "words"),
-    [
-        (None, None, None, "/filter ran 30.000 ms"),
-        (0, "running", None, "/filter ran 30.000 ms"),
-        (1, "running", "/driver 12", "/filter waited 30.000 ms for /driver 12"),
-        (1, "sleeping", "/driver 12 (timer)", "/filter waited 30.000 ms for /driver 12 (timer)"),
-        (0, "preempted", "logger", "/filter waited 30.000 ms for a CPU that logger had"),
-        (0, "runnable", "softirq", "/filter waited 30.000 ms for a CPU"),
-        (0, "sleeping", "timer", "/filter slept 30.000 ms"),
-        (0, "uninterruptible", "interrupt", "/filter waited 30.000 ms for a page or a disk"),
-    ],
-)
-def test_a_callback_that_had_no_cpu_did_not_run(
-    wakers: int | None, state: str | None, who: str | None, words: str
-) -> None:
-    """Where the kernel is traced, pieces of a callback have the state of its thread."""
-    piece = {"activity": "callback", "node": "/filter", "what": "Subscription(/scan)", "hop": 1}
-    thread = {"wakers": wakers, "state": state, "who": who}
-    rest = {"share": 0.6, "duration_ns": 30_000_000}
-    assert list(blamed([piece | thread | rest], None)) == [words]
 
 
 Rows = list[dict[str, Any]]

@@ -25,7 +25,7 @@ from msgflow.errors import UsageError
 from msgflow.query.runner import run_query
 from msgflow.run.window import Window
 from msgflow.watch.follow import watch_finished
-from msgflow.watch.prometheus import Exporter
+from msgflow.watch.prometheus import BOUNDS_S, Exporter
 from msgflow.watch.watcher import Watcher
 from msgflow.watch.window_report import WindowReport
 from msgflow_sim import Recording, simulate
@@ -209,8 +209,7 @@ def test_what_has_gone_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     exporter = Exporter()
     for number in (0, 1, 2, 0, 3):
         path = f"/p{number}"
-        exporter._statuses.update({(path, "reached"): 1, (path, "lost"): 1})
-        exporter._counts[path] = exporter._counts.pop(path, 0) + 1
+        exporter._paths[path] = Counter(reached=1, lost=1), [0] * (2 + len(BOUNDS_S))
         exporter._losses[path, "[a 1]", "lost", "?"] = 1
         exporter.show(shown({"subject": path, "metric": "latency"}))
     assert metrics(exporter, "msgflow_path_flows") == {

@@ -1,6 +1,7 @@
 -- description: The annotations of a run that its trace declares, with their endpoints: those among
 --     a file are not stored again.
 -- grain: one row per annotation
+-- kind: inline
 SELECT
     a.kind, a.process_id,
     (
