@@ -14,7 +14,12 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
 from msgflow.errors import QueryError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import choose_query, load_queries, queries_meant
+from msgflow.query.names import names_in
+from msgflow.query.path_numbers import numbered_path, with_path_numbers
+from msgflow.query.selection import PATH, columns_of, make_selection
+from msgflow.run.choice import Run, read_runs
 from msgflow.run.slice import Slice, SliceWords, TimeWords
+from msgflow.sql.interrupt import interruptible
 from msgflow.text.name_suggestions import did_you_mean
 
 # What is imported here, `msgflow COMMAND --help` waits for: DuckDB and what asks it are not.
@@ -33,11 +38,11 @@ if TYPE_CHECKING:
     from msgflow.ingest import IngestProgress, IngestReport
     from msgflow.links.annotations import AppliedLinks
     from msgflow.links.suggested_links import LinkSuggestions
+    from msgflow.paths.paths_file import NamedPath, PathsFile
     from msgflow.query.compare import Comparison
     from msgflow.query.flow import Start
     from msgflow.query.why import Explanation
     from msgflow.result.query_result import QueryResult
-    from msgflow.run.choice import Run
     from msgflow.sql.header import Header
     from msgflow.sql.value import Value
     from msgflow.verify.targets_file import TargetsFile
@@ -127,7 +132,6 @@ class Database:
         import duckdb
 
         from msgflow.sql.failure import database_errors, out_of_memory, out_of_range
-        from msgflow.sql.interrupt import interruptible
 
         connection = self.connection
         try:
@@ -437,10 +441,7 @@ class Database:
         """
         from msgflow.db.objects import public_names
         from msgflow.db.sql_guard import require_condition
-        from msgflow.query.names import names_in
-        from msgflow.query.path_numbers import with_path_numbers
         from msgflow.query.runner import run_query
-        from msgflow.query.selection import PATH, columns_of, make_selection
 
         header = choose_query(name, parameters, public_names)
         part = Slice(run, start, end)
@@ -521,8 +522,8 @@ class Database:
         Args:
             place: start at the first message on this topic, or at what this node did first, at or
                 after `at`; else give an id.
-            at: epoch ns, an offset from the run's start such as '2.5s', or ISO time; the begin of
-                the run when None.
+            at: epoch ns, an offset from the run's start such as '2.5s', or ISO time; by default the
+                begin of the run.
             publication_id: id of a publication.
             take_id: id of a take.
             callback_instance_id: id of a callback instance.
@@ -725,7 +726,10 @@ class Database:
 
         file = read_targets(Path(targets))
         chosen = Slice(**part)
-        places = self._ask(_places, file, Path(paths), chosen)
+        runs = self._ask(chosen.runs)
+        places = named_places(
+            file, Path(paths), lambda named, path: self._ask(named.require, runs, path)
+        )
         found = self._ask(verify, file, chosen, paths=places, case=case)
         return replace(found, paths=str(paths))
 
@@ -852,8 +856,6 @@ class Database:
 
     def runs(self) -> tuple[Run, ...]:
         """Return the runs in the database, oldest first."""
-        from msgflow.run.choice import read_runs
-
         return self._ask(read_runs)
 
     def check(self) -> list[Finding]:
@@ -1097,7 +1099,6 @@ def _words_of_path(
 ) -> dict[str, list[str]]:
     """Return the arguments of `query` that a path stands for."""
     from msgflow.paths.paths_file import read_paths
-    from msgflow.query.path_numbers import numbered_path
 
     runs = part.runs(connection)
     if name.isdecimal():
@@ -1108,24 +1109,24 @@ def _words_of_path(
     return path.words()
 
 
-def _places(
-    connection: duckdb.DuckDBPyConnection, targets: TargetsFile, file: Path, part: Slice
+def named_places(
+    targets: TargetsFile, file: Path, require: Callable[[PathsFile, NamedPath], None] | None = None
 ) -> dict[str, dict[str, list[str]]]:
-    """Return topics and nodes of the named paths of requirements."""
+    """Return topics and nodes of the named paths of requirements; `require` may refuse a path."""
     from msgflow.paths.paths_file import read_paths
 
     called = [target.path_name for target in targets.targets if target.path_name is not None]
     if not called:
         return {}
     named = read_paths(file)
-    runs = part.runs(connection)
     found = {}
     for text in called:
         try:
             path = named.named(text.value)
         except UsageError as error:
             targets.file.fail(text.line, error.message, error.hint)
-        named.require(connection, runs, path)
+        if require is not None:
+            require(named, path)
         found[text.value] = path.words()
     return found
 
@@ -1149,7 +1150,6 @@ def guarded_rows(
 
     from msgflow.db.sql_guard import guarded_query, in_own_lines
     from msgflow.result.query_result import QueryResult
-    from msgflow.sql.interrupt import interruptible
 
     most = None if limit is None else limit + 1
     query = guarded_query(connection, text, example, most)

@@ -33,7 +33,7 @@ def command(
     count: bool = False,
     form: EventFormat | None = None,
     output: Path | None = None,
-    reader: Reader = Reader.AUTO,
+    reader: Reader = "auto",
     strict: bool = False,
 ) -> None:
     """List the events of any CTF traces in order of time.
@@ -55,7 +55,7 @@ def command(
     from msgflow import trace
     from msgflow.events.selection import Selection
 
-    with trace.open(traces, reader=reader.value, strict=strict) as opened:
+    with trace.open(traces, reader=reader, strict=strict) as opened:
         selection = Selection(opened, event or (), start, end)
         if count:
             _print_counts(selection, form, output)
