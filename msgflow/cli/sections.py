@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from msgflow.cli.output import print_text
 from msgflow.export.formats import by_suffix, json_rows
 from msgflow.result.layout import lay_out, screen_width
+from msgflow.result.screen import screen_lines
 from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
@@ -59,8 +60,6 @@ def screen_sections(
     results: Mapping[str, QueryResult], width: int, *, is_chosen: bool = False
 ) -> Iterator[str]:
     """Yield lines for people, none longer than `width` cells."""
-    from msgflow.result.screen import screen_lines
-
     for position, (section, result) in enumerate(results.items()):
         if position:
             yield ""
