@@ -144,6 +144,24 @@ class Database:
         except duckdb.OutOfRangeException as error:
             raise out_of_range(error, self.path) from error
 
+    def _change(
+        self,
+        work: Callable[Concatenate[duckdb.DuckDBPyConnection, tuple[Run, ...], _P], _T],
+        run: str | int | None,
+        *given: _P.args,
+        **named: _P.kwargs,
+    ) -> _T:
+        """Return what `work` returns for a writing connection and the runs, in one transaction."""
+        from msgflow.db.runs import change_runs
+
+        self.close()
+        return change_runs(
+            self.path,
+            run,
+            lambda connection, runs: work(connection, runs, *given, **named),
+            memory_limit=self._memory_limit,
+        )
+
     def record(
         self,
         program: Sequence[str] = (),
@@ -269,9 +287,7 @@ class Database:
         from msgflow.links.annotations import apply_links
         from msgflow.links.links_file import read_links
 
-        links = read_links(Path(file), content)
-        self.close()
-        return apply_links(self.path, links, run=run, memory_limit=self._memory_limit)
+        return self._change(apply_links, run, read_links(Path(file), content))
 
     def suggest_links(self, *, run: str | int | None = None) -> LinkSuggestions:
         """Return candidates for links of a run, its unnamed topics, and what a file declared.
@@ -317,9 +333,7 @@ class Database:
         from msgflow.clocks.clocks_file import read_clock_sync
         from msgflow.clocks.correction import apply_clocks
 
-        sync = read_clock_sync(clock_sync)
-        self.close()
-        return apply_clocks(self.path, sync, run=run, memory_limit=self._memory_limit)
+        return self._change(apply_clocks, run, read_clock_sync(clock_sync))
 
     def join_bag(self, bag: str | Path, *, run: str | int | None = None) -> QueryResult:
         """Join the messages of a bag to their publications: size, header.stamp, frame_id.
@@ -340,9 +354,11 @@ class Database:
             TraceError: not a bag, a damaged one, or one that takes too much memory.
         """
         from msgflow.bag.join import join_bag
+        from msgflow.bag.messages import read_bag
 
-        self.close()
-        return join_bag(self.path, Path(bag), run=run, memory_limit=self._memory_limit)
+        # The database is opened for a bag that can be read.
+        with read_bag(Path(bag), memory_limit=self._memory_limit) as messages:
+            return self._change(join_bag, run, messages)
 
     def rename_run(self, run: str | int, name: str) -> Run:
         """Give a run another name, and return it as it was.
@@ -356,8 +372,7 @@ class Database:
         """
         from msgflow.db.runs import rename_run
 
-        self.close()
-        return rename_run(self.path, run, name, memory_limit=self._memory_limit)
+        return self._change(rename_run, run, run, name)
 
     def label_runs(self, run: str | int, **labels: str | None) -> tuple[Run, ...]:
         """Give runs labels, and return the runs as they were.
@@ -371,8 +386,7 @@ class Database:
         """
         from msgflow.db.runs import label_runs
 
-        self.close()
-        return label_runs(self.path, run, labels, memory_limit=self._memory_limit)
+        return self._change(label_runs, run, labels)
 
     def remove_runs(self, run: str | int) -> tuple[Run, ...]:
         """Delete runs with all their data, and return them.
@@ -385,8 +399,7 @@ class Database:
         """
         from msgflow.db.runs import remove_runs
 
-        self.close()
-        return remove_runs(self.path, run, memory_limit=self._memory_limit)
+        return self._change(remove_runs, run)
 
     def query(
         self,
