@@ -15,8 +15,6 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-from msgflow.clocks.clocks_file import read_clock_sync
-from msgflow.clocks.correction import apply_clocks
 from msgflow.database import Database, open_db
 from msgflow.ingest import ingest
 from msgflow_sim import simulate
@@ -88,7 +86,7 @@ def database(directory: Path, picture: Picture) -> Path:
     elif not path.exists():
         simulate(picture.system, directory / picture.system, factor=picture.factor)
         ingest([directory / picture.system], path, name=picture.system)
-        apply_clocks(path, read_clock_sync("messages"), run=None)
+        open_db(path).apply_clocks("messages")
     return path
 
 

@@ -40,25 +40,16 @@ __all__ = [
     "open_db",
 ]
 
-_HOME = {
-    "Database": "msgflow.database",
-    "open_db": "msgflow.database",
-    "DatabaseError": "msgflow.errors",
-    "ExitCode": "msgflow.errors",
-    "MsgflowError": "msgflow.errors",
-    "QueryError": "msgflow.errors",
-    "TraceError": "msgflow.errors",
-    "UsageError": "msgflow.errors",
-    "QueryResult": "msgflow.result.query_result",
-    "Slice": "msgflow.run.slice",
-}
+_HOMES = ("msgflow.errors", "msgflow.run.slice", "msgflow.database", "msgflow.result.query_result")
 
 
 def __getattr__(name: str) -> Any:
     # Lazily, so that `msgflow --help` does not pay for the database stack.
-    if name not in _HOME:
-        raise AttributeError(f"module 'msgflow' has no attribute {name!r}")
-    return getattr(import_module(_HOME[name]), name)
+    for home in _HOMES if name in __all__ else ():
+        module = import_module(home)
+        if hasattr(module, name):
+            return getattr(module, name)
+    raise AttributeError(f"module 'msgflow' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -14,7 +14,11 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
 from msgflow.errors import QueryError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import choose_query, load_queries, queries_meant
+from msgflow.query.names import names_in, numbered_path, with_path_numbers
+from msgflow.query.selection import PATH, columns_of, make_selection
+from msgflow.run.choice import Run, read_runs
 from msgflow.run.slice import Slice, SliceWords, TimeWords
+from msgflow.sql.interrupt import interruptible
 from msgflow.text.name_suggestions import did_you_mean
 
 # What is imported here, `msgflow COMMAND --help` waits for: DuckDB and what asks it are not.
@@ -33,11 +37,11 @@ if TYPE_CHECKING:
     from msgflow.ingest import IngestProgress, IngestReport
     from msgflow.links.annotations import AppliedLinks
     from msgflow.links.suggested_links import LinkSuggestions
+    from msgflow.paths.paths_file import NamedPath, PathsFile
     from msgflow.query.compare import Comparison
     from msgflow.query.flow import Start
     from msgflow.query.why import Explanation
     from msgflow.result.query_result import QueryResult
-    from msgflow.run.choice import Run
     from msgflow.sql.header import Header
     from msgflow.sql.value import Value
     from msgflow.verify.targets_file import TargetsFile
@@ -127,7 +131,6 @@ class Database:
         import duckdb
 
         from msgflow.sql.failure import database_errors, out_of_memory, out_of_range
-        from msgflow.sql.interrupt import interruptible
 
         connection = self.connection
         try:
@@ -139,6 +142,24 @@ class Database:
             raise out_of_memory(str(self.path)) from error
         except duckdb.OutOfRangeException as error:
             raise out_of_range(error, self.path) from error
+
+    def _change(
+        self,
+        work: Callable[Concatenate[duckdb.DuckDBPyConnection, tuple[Run, ...], _P], _T],
+        run: str | int | None,
+        *given: _P.args,
+        **named: _P.kwargs,
+    ) -> _T:
+        """Return what `work` returns for a writing connection and the runs, in one transaction."""
+        from msgflow.db.runs import change_runs
+
+        self.close()
+        return change_runs(
+            self.path,
+            run,
+            lambda connection, runs: work(connection, runs, *given, **named),
+            memory_limit=self._memory_limit,
+        )
 
     def record(
         self,
@@ -265,9 +286,7 @@ class Database:
         from msgflow.links.annotations import apply_links
         from msgflow.links.links_file import read_links
 
-        links = read_links(Path(file), content)
-        self.close()
-        return apply_links(self.path, links, run=run, memory_limit=self._memory_limit)
+        return self._change(apply_links, run, read_links(Path(file), content))
 
     def suggest_links(self, *, run: str | int | None = None) -> LinkSuggestions:
         """Return candidates for links of a run, its unnamed topics, and what a file declared.
@@ -313,9 +332,7 @@ class Database:
         from msgflow.clocks.clocks_file import read_clock_sync
         from msgflow.clocks.correction import apply_clocks
 
-        sync = read_clock_sync(clock_sync)
-        self.close()
-        return apply_clocks(self.path, sync, run=run, memory_limit=self._memory_limit)
+        return self._change(apply_clocks, run, read_clock_sync(clock_sync))
 
     def join_bag(self, bag: str | Path, *, run: str | int | None = None) -> QueryResult:
         """Join the messages of a bag to their publications: size, header.stamp, frame_id.
@@ -336,9 +353,11 @@ class Database:
             TraceError: not a bag, a damaged one, or one that takes too much memory.
         """
         from msgflow.bag.join import join_bag
+        from msgflow.bag.messages import read_bag
 
-        self.close()
-        return join_bag(self.path, Path(bag), run=run, memory_limit=self._memory_limit)
+        # The database is opened for a bag that can be read.
+        with read_bag(Path(bag), memory_limit=self._memory_limit) as messages:
+            return self._change(join_bag, run, messages)
 
     def rename_run(self, run: str | int, name: str) -> Run:
         """Give a run another name, and return it as it was.
@@ -352,8 +371,7 @@ class Database:
         """
         from msgflow.db.runs import rename_run
 
-        self.close()
-        return rename_run(self.path, run, name, memory_limit=self._memory_limit)
+        return self._change(rename_run, run, run, name)
 
     def label_runs(self, run: str | int, **labels: str | None) -> tuple[Run, ...]:
         """Give runs labels, and return the runs as they were.
@@ -367,8 +385,7 @@ class Database:
         """
         from msgflow.db.runs import label_runs
 
-        self.close()
-        return label_runs(self.path, run, labels, memory_limit=self._memory_limit)
+        return self._change(label_runs, run, labels)
 
     def remove_runs(self, run: str | int) -> tuple[Run, ...]:
         """Delete runs with all their data, and return them.
@@ -381,8 +398,7 @@ class Database:
         """
         from msgflow.db.runs import remove_runs
 
-        self.close()
-        return remove_runs(self.path, run, memory_limit=self._memory_limit)
+        return self._change(remove_runs, run)
 
     def query(
         self,
@@ -437,9 +453,7 @@ class Database:
         """
         from msgflow.db.objects import public_names
         from msgflow.db.sql_guard import require_condition
-        from msgflow.query.names import names_in, with_path_numbers
         from msgflow.query.runner import run_query
-        from msgflow.query.selection import PATH, columns_of, make_selection
 
         header = choose_query(name, parameters, public_names)
         part = Slice(run, start, end)
@@ -519,8 +533,8 @@ class Database:
         Args:
             place: start at the first message on this topic, or at what this node did first, at or
                 after `at`; else give an id.
-            at: epoch ns, an offset from the run's start such as '2.5s', or ISO time; the begin of
-                the run when None.
+            at: epoch ns, an offset from the run's start such as '2.5s', or ISO time; by default the
+                begin of the run.
             publication_id: id of a publication.
             take_id: id of a take.
             callback_instance_id: id of a callback instance.
@@ -723,7 +737,10 @@ class Database:
 
         file = read_targets(Path(targets))
         chosen = Slice(**part)
-        places = self._ask(_places, file, Path(paths), chosen)
+        runs = self._ask(chosen.runs)
+        places = named_places(
+            file, Path(paths), lambda named, path: self._ask(named.require, runs, path)
+        )
         found = self._ask(verify, file, chosen, paths=places, case=case)
         return replace(found, paths=str(paths))
 
@@ -849,8 +866,6 @@ class Database:
 
     def runs(self) -> tuple[Run, ...]:
         """Return the runs in the database, oldest first."""
-        from msgflow.run.choice import read_runs
-
         return self._ask(read_runs)
 
     def check(self) -> list[Finding]:
@@ -1094,7 +1109,6 @@ def _words_of_path(
 ) -> dict[str, list[str]]:
     """Return the arguments of `query` that a path stands for."""
     from msgflow.paths.paths_file import read_paths
-    from msgflow.query.names import numbered_path
 
     runs = part.runs(connection)
     if name.isdecimal():
@@ -1105,24 +1119,24 @@ def _words_of_path(
     return path.words()
 
 
-def _places(
-    connection: duckdb.DuckDBPyConnection, targets: TargetsFile, file: Path, part: Slice
+def named_places(
+    targets: TargetsFile, file: Path, require: Callable[[PathsFile, NamedPath], None] | None = None
 ) -> dict[str, dict[str, list[str]]]:
-    """Return topics and nodes of the named paths of requirements."""
+    """Return topics and nodes of the named paths of requirements; `require` may refuse a path."""
     from msgflow.paths.paths_file import read_paths
 
     called = [target.path_name for target in targets.targets if target.path_name is not None]
     if not called:
         return {}
     named = read_paths(file)
-    runs = part.runs(connection)
     found = {}
     for text in called:
         try:
             path = named.named(text.value)
         except UsageError as error:
             targets.file.fail(text.line, error.message, error.hint)
-        named.require(connection, runs, path)
+        if require is not None:
+            require(named, path)
         found[text.value] = path.words()
     return found
 
@@ -1146,7 +1160,6 @@ def guarded_rows(
 
     from msgflow.db.sql_guard import guarded_query, in_own_lines
     from msgflow.result.query_result import QueryResult
-    from msgflow.sql.interrupt import interruptible
 
     most = None if limit is None else limit + 1
     query = guarded_query(connection, text, example, most)

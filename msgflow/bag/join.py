@@ -8,16 +8,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from msgflow.bag.messages import read_bag
-from msgflow.db.runs import change_runs
 from msgflow.errors import UsageError
 from msgflow.result.query_result import QueryResult
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import duckdb
+    import pyarrow as pa
 
     from msgflow.run.choice import Run
 
@@ -38,31 +35,25 @@ ORDER BY publication_id
 
 
 def join_bag(
-    path: Path, bag: Path, *, run: str | int | None, memory_limit: str | None = None
+    con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...], messages: pa.RecordBatchReader
 ) -> QueryResult:
     """Store which publications the messages of a bag are of; see `Database.join_bag`."""
-
-    def join(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> QueryResult:
-        if len(runs) > 1:
-            raise UsageError("a bag is of one run", "give its name with --run")
-        (one,) = runs
-        if con.execute(_CLOCKS_APART, [one.run_id]).fetchall() == [(True,)]:
-            raise UsageError(
-                f"the run has hosts whose clocks are not synchronised — {one.name}",
-                f"msgflow clocks apply messages --run {one.name}",
-            )
-        given: dict[str, Any] = {"run_id": one.run_id}
-        con.register("bag_messages", messages)
-        con.execute("CREATE OR REPLACE TEMP TABLE bag_read AS FROM bag_messages")
-        con.unregister("bag_messages")
-        internal_sql().keep(con, "bag_joined", given)
-        con.execute("DELETE FROM store.bag_message WHERE run_id = $run_id", given)
-        con.execute(_STORED, given)
-        table = internal_sql().run(con, "bag_topic", {}).to_arrow_table()
-        con.execute("DROP TABLE temp.bag_read")
-        con.execute("DROP TABLE temp.bag_joined")
-        return QueryResult(table, internal_sql().header("bag_topic"), runs)
-
-    # The database is opened for a bag that can be read.
-    with read_bag(bag, memory_limit=memory_limit) as messages:
-        return change_runs(path, run, join, memory_limit=memory_limit)
+    if len(runs) > 1:
+        raise UsageError("a bag is of one run", "give its name with --run")
+    (one,) = runs
+    if con.execute(_CLOCKS_APART, [one.run_id]).fetchall() == [(True,)]:
+        raise UsageError(
+            f"the run has hosts whose clocks are not synchronised — {one.name}",
+            f"msgflow clocks apply messages --run {one.name}",
+        )
+    given: dict[str, Any] = {"run_id": one.run_id}
+    con.register("bag_messages", messages)
+    con.execute("CREATE OR REPLACE TEMP TABLE bag_read AS FROM bag_messages")
+    con.unregister("bag_messages")
+    internal_sql().keep(con, "bag_joined", given)
+    con.execute("DELETE FROM store.bag_message WHERE run_id = $run_id", given)
+    con.execute(_STORED, given)
+    table = internal_sql().run(con, "bag_topic", {}).to_arrow_table()
+    con.execute("DROP TABLE temp.bag_read")
+    con.execute("DROP TABLE temp.bag_joined")
+    return QueryResult(table, internal_sql().header("bag_topic"), runs)

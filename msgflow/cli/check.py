@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import textwrap
 from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
@@ -13,9 +12,9 @@ import typer
 
 from msgflow.cli.operation import operation
 from msgflow.cli.output import is_screen, print_lines, print_next, print_result, print_status
+from msgflow.database import Database
 from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
-from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.run.choice import choose_runs
 from msgflow.text.values import count, format_cell
 from msgflow.text.wrapping import wrap
@@ -31,12 +30,12 @@ PLACES_SHOWN = 10
 
 @operation
 def command(
+    database: Database,
     *,
     run: str | None = None,
     detail: bool = False,
     form: Format | None = None,
     output: Path | None = None,
-    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Show what is wrong with a recording, with cause and cure; exit code 1 on errors.
 
@@ -50,24 +49,20 @@ def command(
     import pyarrow as pa
 
     from msgflow.cli.tracing_cost import part_of_latencies, share_of_cpu
-    from msgflow.database import Database
     from msgflow.db.finding import Finding, commands_after
     from msgflow.result.query_result import QueryResult
 
-    with Database(database) as opened:
-        findings = opened.findings(run=run, detail=detail)
-        is_text = output is None and form in (None, Format.TABLE)
-        is_explained = detail and is_text
-        quality = opened.query("info", section="quality", run=run) if is_explained else None
-        every = opened.runs()
-        chosen = choose_runs(every, run)
-        runs = every if detail else chosen
-        notes = [
-            *opened.clock_verdicts(run=run, only_several=True),
-            *share_of_cpu(opened, chosen),
-        ]
-        if detail:
-            notes += part_of_latencies(opened, opened.query("e2e-latency", run=run))
+    findings = database.findings(run=run, detail=detail)
+    is_text = output is None and form in (None, Format.TABLE)
+    is_explained = detail and is_text
+    quality = database.query("info", section="quality", run=run) if is_explained else None
+    every = database.runs()
+    chosen = choose_runs(every, run)
+    runs = every if detail else chosen
+    clocks = database.clock_verdicts(run=run, only_several=True)
+    notes = [*clocks, *share_of_cpu(database, chosen)]
+    if detail:
+        notes += part_of_latencies(database, database.query("e2e-latency", run=run))
     labels = {one.run_id: one.title for one in runs} if len(runs) > 1 else {}
     if is_text:
         print_lines(_text(findings, labels))
@@ -87,13 +82,13 @@ def command(
     ]
     print_status(", ".join(numbers) if findings else "nothing is wrong with the recording")
     if not runs:
-        print_next(["msgflow", "ingest", "TRACE"], database)
+        print_next(["msgflow", "ingest", "TRACE"], database.path)
     else:
         # Most commands explain one run: what is worst comes first, else what is newest.
         shown = [one.run_id for one in chosen]
         about = next((each.run_id for each in findings if each.run_id in shown), shown[-1])
         for step in commands_after([each for each in findings if each.run_id == about]):
-            print_next(step.split(), database, None if run is None else about)
+            print_next(step.split(), database.path, None if run is None else about)
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(ExitCode.FAILED)
 
@@ -128,15 +123,10 @@ def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterato
         if len(places) > PLACES_SHOWN:
             yield f"   … and {len(places) - PLACES_SHOWN} more; --format json has them all"
         for label, text in (
-            ("means", first.description),
-            ("cause", first.cause),
-            ("cure", first.cure),
+            ("   means: ", first.description),
+            ("   cause: ", first.cause),
+            ("   cure:  ", first.cure),
         ):
-            yield from textwrap.wrap(
-                text,
-                width,
-                initial_indent=f"   {label + ':':<7}",
-                subsequent_indent=" " * 10,
-                break_long_words=False,
-                break_on_hyphens=False,
-            )
+            head, *more = wrap(text, width - len(label))
+            yield label + head
+            yield from (" " * len(label) + line for line in more)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -11,7 +10,6 @@ from msgflow.cli.operation import operation
 from msgflow.cli.output import print_note, print_runs, print_status
 from msgflow.cli.query_command import AskingGroup, print_rows
 from msgflow.database import Database
-from msgflow.files.default_files import DEFAULT_DATABASE
 
 if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
@@ -35,30 +33,29 @@ app = typer.Typer(cls=_ClocksGroup)
 
 @app.command("apply")
 @operation
-def apply(how: str, *, run: str | None = None, database: Path = DEFAULT_DATABASE) -> None:
+def apply(database: Database, how: str, *, run: str | None = None) -> None:
     """Correct the clocks of a run, replacing any earlier correction; reads no trace.
 
     Args:
         how (none|messages|FILE): As recorded, by the messages between hosts (and the network
             packets of their kernel traces), or by the offsets in a YAML or TOML file.
     """
-    with Database(database) as opened:
-        runs = opened.apply_clocks(how, run=run)
-        print_runs(runs)
-        for one in runs:
-            clocks = opened.query("clocks", run=one.run_id).to_arrow().to_pylist()
-            corrected = [clock for clock in clocks if clock["method"] not in ("none", "reference")]
-            print_status(f"{len(corrected)} of {len(clocks)} clocks corrected: msgflow clocks")
-            pairs = opened.query("clocks-pair", run=one.run_id).to_arrow().to_pylist()
-            if how == "messages" and pairs:
-                messages = sum(pair["message_count"] for pair in pairs)
-                packets = sum(pair["packet_count"] for pair in pairs)
-                print_status(
-                    f"by {messages:,} messages and {packets:,} network packets:"
-                    " msgflow clocks --by pair"
-                )
-            findings = opened.query(
-                "info-findings", run=one.run_id, where="starts_with(name, 'clock_')"
+    runs = database.apply_clocks(how, run=run)
+    print_runs(runs)
+    for one in runs:
+        clocks = database.query("clocks", run=one.run_id).to_arrow().to_pylist()
+        corrected = [clock for clock in clocks if clock["method"] not in ("none", "reference")]
+        print_status(f"{len(corrected)} of {len(clocks)} clocks corrected: msgflow clocks")
+        pairs = database.query("clocks-pair", run=one.run_id).to_arrow().to_pylist()
+        if how == "messages" and pairs:
+            messages = sum(pair["message_count"] for pair in pairs)
+            packets = sum(pair["packet_count"] for pair in pairs)
+            print_status(
+                f"by {messages:,} messages and {packets:,} network packets:"
+                " msgflow clocks --by pair"
             )
-            for finding in findings.to_arrow().to_pylist():
-                print_note(f"{finding['name']}: {finding['detail']}")
+        findings = database.query(
+            "info-findings", run=one.run_id, where="starts_with(name, 'clock_')"
+        )
+        for finding in findings.to_arrow().to_pylist():
+            print_note(f"{finding['name']}: {finding['detail']}")

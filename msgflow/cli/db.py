@@ -35,9 +35,8 @@ def upgrade(*, database: Path = DEFAULT_DATABASE) -> None:
 @app.command("schema")
 @operation
 def schema(
+    database: Database,
     view: Annotated[str | None, typer.Argument(autocompletion=complete("view"))] = None,
-    *,
-    database: Path = DEFAULT_DATABASE,
     **shown: Unpack[Shown],
 ) -> None:
     """List the public views; with the name of one, its columns with type and meaning.
@@ -45,6 +44,4 @@ def schema(
     Args:
         view ([VIEW]): A view: list its columns.
     """
-    with Database(database) as opened:
-        result = opened.views() if view is None else opened.schema(view)
-    print_result(result, **shown)
+    print_result(database.views() if view is None else database.schema(view), **shown)

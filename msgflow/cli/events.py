@@ -33,7 +33,7 @@ def command(
     count: bool = False,
     form: EventFormat | None = None,
     output: Path | None = None,
-    reader: Reader = Reader.AUTO,
+    reader: Reader = "auto",
     strict: bool = False,
 ) -> None:
     """List the events of any CTF traces in order of time.
@@ -55,7 +55,7 @@ def command(
     from msgflow import trace
     from msgflow.events.selection import Selection
 
-    with trace.open(traces, reader=reader.value, strict=strict) as opened:
+    with trace.open(traces, reader=reader, strict=strict) as opened:
         selection = Selection(opened, event or (), start, end)
         if count:
             _print_counts(selection, form, output)
@@ -109,12 +109,7 @@ def _print_counts(selection: Selection, form: EventFormat | None, output: Path |
     from msgflow.result.query_result import QueryResult
 
     counts = selection.counts()
-    table = pyarrow.table(
-        {
-            "name": pyarrow.array(counts.keys(), "string"),
-            "event_count": pyarrow.array(counts.values(), "int64"),
-        }
-    )
-    formats = {EventFormat.TEXT: Format.TABLE}
-    chosen = None if form is None else formats.get(form) or Format(form.value)
-    print_result(QueryResult(table), chosen, output)
+    columns = {"name": [*counts], "event_count": [*counts.values()]}
+    schema = pyarrow.schema({"name": "string", "event_count": "int64"})
+    chosen = None if form is None else Format("table" if form is EventFormat.TEXT else form.value)
+    print_result(QueryResult(pyarrow.table(columns, schema)), chosen, output)

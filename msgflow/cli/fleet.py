@@ -47,7 +47,7 @@ def ingest(
     views: Annotated[bool, typer.Option()] = False,
     database: Annotated[bool, typer.Option()] = True,
     clock_sync: Annotated[str, typer.Option()] = "none",
-    reader: Reader = Reader.AUTO,
+    reader: Reader = "auto",
     strict: bool = False,
     ignore: list[str] | None = None,
     events: list[str] | None = None,
@@ -88,7 +88,7 @@ def ingest(
     from msgflow.fleet.task import Options
 
     given: dict[str, Any] = {
-        "reader": reader.value,
+        "reader": reader,
         "strict": strict,
         "ignore": ignore or [],
         "events": events or [],

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from msgflow.cli.operation import parameters_of
 from msgflow.cli.output import print_note, print_runs, print_text
@@ -18,21 +17,11 @@ if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
 
 
-class AnyFormat(StrEnum):
-    """A format of graphs, or of rows."""
-
-    DOT = "dot"
-    MERMAID = "mermaid"
-    JSON = "json"
-    TABLE = "table"
-    CSV = "csv"
-    CSV_SAFE = "csv-safe"
-    JSONL = "jsonl"
-    PARQUET = "parquet"
-    MARKDOWN = "markdown"
+_OfGraphs = Literal["dot", "mermaid", "json"]
+_OfRows = Literal["table", "csv", "csv-safe", "jsonl", "parquet", "markdown"]
 
 
-def _options(*, form: AnyFormat | None = None) -> None:
+def _options(*, form: Literal[_OfGraphs, _OfRows] | None = None) -> None:
     """Declare what differs from a query.
 
     Args:
@@ -51,13 +40,12 @@ def asked(words: list[str]) -> Any:
     )
 
 
-def _form(form: AnyFormat | None, path: Path | None) -> GraphFormat | Format:
+def _form(form: str | None, path: Path | None) -> GraphFormat | Format:
     from msgflow.export.graph import GraphFormat, graph_format
 
     if form is None:
         return graph_format(path)
-    languages = [each.value for each in GraphFormat]
-    return GraphFormat(form.value) if form.value in languages else Format(form.value)
+    return GraphFormat(form) if form in get_args(_OfGraphs) else Format(form)
 
 
 def _write(result: QueryResult, form: Any, given: dict[str, Any]) -> None:

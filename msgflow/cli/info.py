@@ -6,8 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-from msgflow.cli.header_options import header_option
-from msgflow.cli.operation import operation
+from msgflow.cli.operation import header_option, operation
 from msgflow.cli.options import SELECTION
 from msgflow.cli.output import is_screen, print_note
 from msgflow.cli.query_command import build_command, choice_of, chosen_by
@@ -18,7 +17,6 @@ from msgflow.cli.sections import (
     screen_sections,
 )
 from msgflow.database import Database
-from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import load_query
 
 SECTIONS = ("runs", "hosts", "processes", "nodes", "topics", "counts", "findings")
@@ -32,6 +30,7 @@ def asked(words: list[str]) -> Any:
 
 @operation
 def command(
+    database: Database,
     *,
     section: Annotated[str | None, header_option(_SECTION, SELECTION)] = None,
     run: str | None = None,
@@ -39,7 +38,6 @@ def command(
     form: SectionsFormat | None = None,
     output: Path | None = None,
     wide: bool = False,
-    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Print what a database holds: runs, hosts, processes, nodes, topics, counts, data quality.
 
@@ -49,19 +47,15 @@ def command(
         form (table|json|markdown): By default by the suffix of FILE, else table.
     """
     form = chosen_format(form, output)
-    with Database(database) as opened:
-        # Its topics are a query of their own.
-        results = {
-            section: opened.query("topics", run=run, internal=internal)
-            if section == "topics"
-            else opened.query(
-                "info",
-                run="all" if section == "runs" else run,
-                internal=internal,
-                section=section,
-            )
-            for section in SECTIONS
-        }
+    # Its topics are a query of their own.
+    results = {
+        section: database.query("topics", run=run, internal=internal)
+        if section == "topics"
+        else database.query(
+            "info", run="all" if section == "runs" else run, internal=internal, section=section
+        )
+        for section in SECTIONS
+    }
     is_brief = output is None and is_screen() and not wide
     print_sections(results, form, output, partial(screen_sections, results) if is_brief else None)
     for section, result in results.items():

@@ -36,7 +36,7 @@ def command(
     keep_staging: Path | None = None,
     links: Path | None = None,
     clock_sync: str = "none",
-    reader: Reader = Reader.AUTO,
+    reader: Reader = "auto",
     strict: bool = False,
     ignore: list[str] | None = None,
     events: list[str] | None = None,
@@ -75,7 +75,7 @@ def command(
             recordings = [Recording(traces, hosts)]
             # How far clocks are apart is not known before they are brought together.
             if not together and clock_sync == "none":
-                recordings = find_recordings(traces, hosts, reader=reader.value)
+                recordings = find_recordings(traces, hosts, reader=reader)
             if len(recordings) > 1:
                 for option, given in (("--name", name), ("--keep-staging", keep_staging)):
                     if given is not None:
@@ -99,7 +99,7 @@ def command(
                     keep_staging=keep_staging,
                     links=links,
                     clock_sync=clock_sync,
-                    reader=reader.value,
+                    reader=reader,
                     strict=strict,
                     ignore=ignore or [],
                     events=events or [],

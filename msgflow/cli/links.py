@@ -11,7 +11,6 @@ from msgflow.cli.operation import operation
 from msgflow.cli.output import print_note, print_runs, print_status
 from msgflow.cli.query_command import AskingGroup
 from msgflow.database import Database
-from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.text.values import count
 
 if TYPE_CHECKING:
@@ -27,7 +26,7 @@ app = typer.Typer(cls=_LinksGroup)
 
 @app.command("apply")
 @operation
-def apply(file: Path, *, run: str | None = None, database: Path = DEFAULT_DATABASE) -> None:
+def apply(database: Database, file: Path, *, run: str | None = None) -> None:
     """Declare the links and topics of a file and derive all links of the run again.
 
     The trace is not needed.
@@ -35,13 +34,12 @@ def apply(file: Path, *, run: str | None = None, database: Path = DEFAULT_DATABA
     Args:
         file: Links to declare, as YAML.
     """
-    with Database(database) as opened:
-        for one in opened.apply_links(file, run=run):
-            print_runs([one.run])
-            print_applied(opened, one)
+    for one in database.apply_links(file, run=run):
+        print_runs([one.run])
+        print_applied(database, one)
 
 
-def print_applied(opened: Database, one: AppliedLinks) -> None:
+def print_applied(database: Database, one: AppliedLinks) -> None:
     """Print what was declared, and what contradicts it."""
     known = f", {one.known_count} of them by the trace itself" if one.known_count else ""
     traced = f", and {one.traced_link_count} that the trace declares itself"
@@ -54,7 +52,7 @@ def print_applied(opened: Database, one: AppliedLinks) -> None:
     )
     for sentence in one.without_effect:
         print_note(sentence)
-    findings = opened.query(
+    findings = database.query(
         "info-findings", run=one.run.run_id, where="name = 'contradictory_annotations'"
     )
     for finding in findings.to_arrow().to_pylist():

@@ -1,40 +1,74 @@
 """How a command comes to be: from the signature and the docstring of a function.
 
 A parameter before `*` becomes an argument, one behind it an option; `**part: Unpack[Words]` becomes
-an option for each key of that TypedDict. Their help stands in `Args:` of the docstring, with the
-metavar in brackets: `directory (DIR): where to write`. What several commands have, such as `run`
-and `output`, stands in `msgflow/cli/options.py`, by its name; a docstring may say it anew.
-`Annotated[…, typer.Option(…)]` says what is left: limits, a short name.
+an option for each key of that TypedDict; a `Database` is that of --db, open while the function
+runs. Their help stands in `Args:` of the docstring, with the metavar in brackets: `directory (DIR):
+where to write`. What several commands have, such as `run` and `output`, stands in
+`msgflow/cli/options.py`, by its name; a docstring may say it anew. `Annotated[…, typer.Option(…)]`
+says what is left: limits, a short name. A parameter in the header of an SQL file becomes an option,
+too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from copy import copy
 from inspect import Parameter, Signature, signature
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
 import docstring_parser
 import typer
 from typer.models import ArgumentInfo, OptionInfo
 
+from msgflow.cli.completion import complete
 from msgflow.cli.options import ADVANCED, ADVANCED_NAMES, SHARED, one_text, path_of
+from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.query.names import PLACE_PARAMETERS
+
+if TYPE_CHECKING:
+    from msgflow.sql.header import Param
 
 Command = Callable[..., None]
+OWN = "own_"
 _PLACES = {"from_", "to", "via", "without"}
 _METAVARS = {bool: "", int: "NUMBER", float: "NUMBER", str: "TEXT"}
 """What the help shows for a type. A switch takes nothing."""
 
 
 def operation(function: Command) -> Command:
-    """Make a function a command: Typer finds its parameters and its help where it looks."""
-    parameters = list(parameters_of(function))
-    set_parameters(function, parameters)
-    function.__doc__ = "\n\n".join([_help(function), *_arguments(parameters)])
-    return function
+    """Return a command that calls a function, in which Typer finds its parameters and its help."""
+    opened = [name for name, hint in function.__annotations__.items() if hint == "Database"]
+
+    def command(*given: Any, **named: Any) -> None:
+        with ExitStack() as stack:
+            databases = {name: stack.enter_context(Database(named[name])) for name in opened}
+            function(*given, **named | databases)
+
+    return _described(command, list(parameters_of(function)), function)
+
+
+def extends(method: Callable[..., Any]) -> Callable[[Command], Command]:
+    """Return a decorator: the command has the parameters of a method, too.
+
+    The function gets those values that were given, as `asked`, for a call of the method.
+    """
+
+    def decorate(function: Command) -> Command:
+        own = list(parameters_of(function, skipped=("asked",)))
+        asked = list(parameters_of(method, skipped=("self", *(each.name for each in own))))
+
+        def command(**given: Any) -> None:
+            words = {each.name: given[each.name] for each in own}
+            with Database(given["database"]) as opened:
+                function(**words | {"database": opened}, **_said(given, asked))
+
+        return _described(command, [*asked, *own], function)
+
+    return decorate
 
 
 def asks(method: Callable[..., Any]) -> Callable[[Command], Command]:
@@ -44,39 +78,49 @@ def asks(method: Callable[..., Any]) -> Callable[[Command], Command]:
     of these values that it has a parameter for; its other parameters become options, too. The help
     is that of the method, then that of the function.
     """
-    asked = list(parameters_of(method, skipped=("self",)))
+    database, *asked = parameters_of(method)
 
     def decorate(show: Command) -> Command:
         answer, *_ = signature(show).parameters
         shown = list(parameters_of(show, skipped=(answer,)))
-        plain = Parameter("database", Parameter.KEYWORD_ONLY, default=DEFAULT_DATABASE)
-        database = plain.replace(annotation=_annotated(plain, Path, None))
-        parameters = {each.name: each for each in [*asked, *shown, database]}
-        parameters |= {each.name: each for each in asked}
 
         def command(**given: Any) -> None:
-            from msgflow.database import Database
-
-            words = {each.name: given[each.name] for each in asked}
-            words |= {name: one_text(words[name]) for name in _PLACES & words.keys()}
-            said = {name: value for name, value in words.items() if value not in (None, [])}
             with Database(given["database"]) as opened:
-                found = method(opened, **said)
+                found = method(opened, **_said(given, asked))
             show(found, **{each.name: given[each.name] for each in shown})
 
-        set_parameters(command, list(parameters.values()))
-        arguments = _arguments(parameters.values())
-        command.__doc__ = "\n\n".join([_help(method), _help(show), *arguments])
-        return command
+        parameters = {each.name: each for each in [*asked, *shown]}
+        parameters |= {each.name: each for each in [database, *asked]}
+        return _described(command, list(parameters.values()), method, show)
 
     return decorate
+
+
+def _said(given: Mapping[str, Any], asked: Iterable[Parameter]) -> dict[str, Any]:
+    """Return the values that were given, as a method takes them."""
+    words = {each.name: given[each.name] for each in asked}
+    words |= {name: one_text(words[name]) for name in _PLACES & words.keys()}
+    return {name: value for name, value in words.items() if value not in (None, [])}
+
+
+def _described(
+    command: Command, parameters: Sequence[Parameter], *functions: Callable[..., Any]
+) -> Command:
+    """Return a command with parameters, and with the help of functions."""
+    set_parameters(command, parameters)
+    command.__doc__ = "\n\n".join([*map(_help, functions), *_arguments(parameters)])
+    return command
 
 
 def set_parameters(command: Command, parameters: Sequence[Parameter]) -> None:
     """Give a command the parameters from which Typer makes its arguments and options."""
     ordered = sorted(
         parameters,
-        key=lambda each: (each.kind, get_args(each.annotation)[1].rich_help_panel == ADVANCED),
+        key=lambda each: (
+            each.kind,
+            each.default == DEFAULT_DATABASE,
+            get_args(each.annotation)[1].rich_help_panel == ADVANCED,
+        ),
     )
     command.__signature__ = Signature(ordered)  # type: ignore[attr-defined]
     command.__annotations__ = {each.name: each.annotation for each in parameters}
@@ -90,9 +134,14 @@ def parameters_of(
     for parameter in signature(function).parameters.values():
         if parameter.name in skipped:
             continue
+        if parameter.name == "self":
+            parameter = parameter.replace(name="database", annotation="Database")
         # One by one: not every type of a function is imported where no type checker runs.
         hint = eval(parameter.annotation, function.__globals__)
-        if parameter.kind is Parameter.VAR_KEYWORD:
+        if hint is Database:
+            option = Parameter(parameter.name, Parameter.KEYWORD_ONLY, default=DEFAULT_DATABASE)
+            yield option.replace(annotation=_annotated(option, Path, None))
+        elif parameter.kind is Parameter.VAR_KEYWORD:
             (words,) = get_args(hint)
             for name, kind in get_type_hints(words).items():
                 word = Parameter(name, Parameter.KEYWORD_ONLY, default=None)
@@ -141,13 +190,15 @@ def _annotated(
         info.help = escape(text[:1].upper() + text[1:])
         info.metavar = said.type_name or info.metavar
     if isinstance(info, OptionInfo) and info.default is ...:
-        word = parameter.name.strip("_").replace("_", "-")
+        word = parameter.name.strip("_").removesuffix("_id").replace("_", "-")
         info.default = f"--{word}/--no-{word}" if parameter.default is True else f"--{word}"
     kind = _plain(kind)
     if Path in (kind, *get_args(kind)):
         info.parser, info.metavar = path_of, info.metavar or "FILE"
     if isinstance(info, OptionInfo):
         types = (kind, *get_args(kind))
+        if parameter.name.endswith("_id"):
+            info.metavar = "ID"
         if info.metavar is None:
             info.metavar = next((_METAVARS[each] for each in types if each in _METAVARS), None)
         if parameter.name in ADVANCED_NAMES:
@@ -173,3 +224,55 @@ def _help(function: Callable[..., Any]) -> str:
 
 def _parsed(function: Callable[..., Any]) -> docstring_parser.Docstring:
     return docstring_parser.parse(function.__doc__ or "", docstring_parser.DocstringStyle.GOOGLE)
+
+
+def header_option(param: Param, panel: str = "Parameters") -> Any:
+    """Return the option for a parameter of a header, in which the default stands."""
+    flag = f"--{param.name.replace('_', '-')}"
+    metavar = {"BOOLEAN": "", "VARCHAR": "TEXT"}.get(param.type, "NUMBER")
+    completion: Callable[..., list[str]] | None = None
+    if param.name in PLACE_PARAMETERS:
+        metavar, completion = "NAME", complete("place")
+    elif param.choices:
+        metavar, completion = "WORD", lambda: list(param.choices)
+    return typer.Option(
+        f"{flag}/--no-{flag[2:]}" if param.type == "BOOLEAN" else flag,
+        metavar=metavar,
+        help=escape(_describe(param)),
+        show_default=False,
+        autocompletion=completion,
+        rich_help_panel=ADVANCED if param.name in ADVANCED_NAMES else panel,
+    )
+
+
+def header_parameter(param: Param) -> Parameter:
+    """Return the parameter of a command for a parameter of a header, with OWN before its name."""
+    kind: Any = bool if param.type == "BOOLEAN" else str
+    if param.name in PLACE_PARAMETERS:
+        kind = list[str]
+    return Parameter(
+        f"{OWN}{param.name}",
+        Parameter.KEYWORD_ONLY,
+        default=None if param.has_default else Parameter.empty,
+        annotation=Annotated[kind | None, header_option(param)],
+    )
+
+
+def _describe(param: Param) -> str:
+    text = param.description
+    if param.choices:
+        text += f" ({', '.join(param.choices)})"
+    if param.minimum is not None:
+        text += f" (at least {param.minimum})"
+    if param.has_default and param.default is not None:
+        default = param.default
+        text += f" [default: {str(default).lower() if isinstance(default, bool) else default}]"
+    return text
+
+
+def given_of(words: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of those parameters of a header that were given."""
+    own = {name.removeprefix(OWN): value for name, value in words.items() if name.startswith(OWN)}
+    return {
+        name: one_text(value) for name, value in own.items() if value is not None and value != []
+    }

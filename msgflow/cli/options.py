@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 import os
 import re
-from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import typer
 from typer.core import TyperGroup
@@ -74,12 +73,8 @@ def path_of(text: str | Path) -> Path:
     return Path(os.path.expanduser(text))
 
 
-class Reader(StrEnum):
-    """Decoders of traces."""
-
-    AUTO = "auto"
-    MSGFLOW = "msgflow"
-    BT2 = "bt2"
+Reader = Literal["auto", "msgflow", "bt2"]
+"""Decoders of traces."""
 
 
 def _selecting(help: str, metavar: str | None = None, **more: Any) -> Any:
@@ -121,6 +116,7 @@ SHARED: dict[str, Any] = {
     ),
     "end": _selecting("End of the time window, in the same formats as --start", "TIME"),
     "internal": _selecting("Also show what ROS does for itself (/rosout, /parameter_events, …)"),
+    "at": typer.Option(metavar="TIME"),
     "place": typer.Argument(metavar="[TOPIC|NODE]", autocompletion=complete("place")),
     "from_": _place("Topics or nodes where flows start"),
     "to": _place("Topics or nodes where flows end"),

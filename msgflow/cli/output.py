@@ -16,7 +16,10 @@ from rich.cells import cell_len
 from msgflow.errors import UsageError
 from msgflow.export.formats import Format, format_of, write_result
 from msgflow.files.default_files import DEFAULT_DATABASE
-from msgflow.result.layout import MOST_ROWS, screen_width
+from msgflow.result.layout import MOST_ROWS, lay_out, screen_width
+from msgflow.result.screen import screen_lines
+from msgflow.text.values import count, printable
+from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -27,6 +30,8 @@ if TYPE_CHECKING:
 
 # The narrowest column in which text wraps beside a name.
 _LEAST_ROOM = 20
+# What a terminal may obey of a text.
+_LINES = "\n\t"
 
 
 def print_error(message: str, hint: str | None = None) -> None:
@@ -40,12 +45,12 @@ def print_error(message: str, hint: str | None = None) -> None:
 def print_note(text: str) -> None:
     """Print something worth knowing about the data."""
     # A name in it begins no line of its own: it might read as a command to run next.
-    _labelled("note", typer.colors.YELLOW, _shown(text, keep=""))
+    _labelled("note", typer.colors.YELLOW, printable(text))
 
 
 def print_status(text: str) -> None:
     """Print what was done."""
-    typer.echo("\n".join(_fitting(_shown(text, keep=""), "  ")), err=True)
+    typer.echo("\n".join(_fitting(printable(text), "  ")), err=True)
 
 
 def print_next(words: Sequence[str], database: Path, run: str | int | None = None) -> None:
@@ -66,7 +71,7 @@ def is_asked() -> bool:
 
 def confirm(question: str) -> bool:
     """Ask on the terminal whether to go on; no answer means no."""
-    return typer.confirm(_shown(question), err=True)
+    return typer.confirm(printable(question, _LINES), err=True)
 
 
 class Shown(TypedDict, total=False):
@@ -88,7 +93,6 @@ def print_result(
 ) -> None:
     """Write a result to a file or stdout, and say on stderr what it leaves out."""
     from msgflow.files.atomic import replacing
-    from msgflow.text.values import count
 
     form = form or format_of(output)
     if columns is not None:
@@ -121,14 +125,11 @@ def is_screen() -> bool:
 
 
 def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | None) -> None:
-    from msgflow.result.layout import lay_out
-    from msgflow.result.screen import screen_lines
-
     width = screen_width()
     shown = lay_out(result, width, most_rows=most_rows, is_chosen=is_chosen)
     print_lines(screen_lines(shown, width))
     if shown.not_shown is not None:
-        text = "\n".join(_fitting(_shown(shown.not_shown), " " * len("not shown: ")))
+        text = "\n".join(_fitting(printable(shown.not_shown, _LINES), " " * len("not shown: ")))
         typer.echo(text if os.environ.get("NO_COLOR") else typer.style(text, dim=True), err=True)
     for note in shown.notes:
         print_note(note)
@@ -137,7 +138,7 @@ def _print_for_screen(result: QueryResult, is_chosen: bool, most_rows: int | Non
 def print_runs(runs: Sequence[Run]) -> None:
     """Print which runs were read, if any."""
     if runs:
-        names = _shown(", ".join(run.title for run in runs), keep="")
+        names = printable(", ".join(run.title for run in runs))
         _labelled("run" if len(runs) == 1 else "runs", typer.colors.CYAN, names)
 
 
@@ -184,8 +185,6 @@ def print_lines(lines: Iterable[str]) -> None:
 
 def print_list(rows: Sequence[tuple[str, str]], titles: tuple[str, str] | None = None) -> None:
     """Write names and their descriptions side by side; a terminal wraps the descriptions."""
-    from msgflow.text.wrapping import wrap
-
     every = [*([titles] if titles else []), *rows]
     width = max(cell_len(name) for name, _ in every)
     room = max(_LEAST_ROOM, screen_width() - width - 2) if is_screen() else None
@@ -226,7 +225,7 @@ class _Terminal:
 
     def write(self, data: bytes) -> int:
         text = self._decoder.decode(bytes(data))
-        self._stream.write(_shown(text).encode())
+        self._stream.write(printable(text, _LINES).encode())
         return len(data)
 
     def flush(self) -> None:
@@ -244,14 +243,6 @@ def terminal(stream: IO[bytes]) -> IO[bytes]:
     return cast("IO[bytes]", _Terminal(stream))
 
 
-def _shown(text: str, keep: str = "\n\t") -> str:
-    if text.isprintable():
-        return text
-    from msgflow.text.values import printable
-
-    return printable(text, keep)
-
-
 def _width_of_stderr() -> int:
     """Return the width of the terminal of stderr; stdout may go elsewhere."""
     if os.environ.get("COLUMNS", "").isdigit():
@@ -266,8 +257,6 @@ def _fitting(text: str, indent: str, used: int = 0) -> list[str]:
     """Return the lines of a text for stderr, wrapped to the width of its terminal."""
     if sys.stderr is None or not sys.stderr.isatty() or "\n" in text:
         return [text]
-    from msgflow.text.wrapping import wrap
-
     width = _width_of_stderr()
     if used + cell_len(text) <= width:
         return [text]
@@ -277,6 +266,6 @@ def _fitting(text: str, indent: str, used: int = 0) -> list[str]:
 
 def _labelled(label: str, color: str, text: str) -> None:
     indent = " " * (len(label) + 2)
-    text = "\n".join(_fitting(_shown(text), indent, len(indent)))
+    text = "\n".join(_fitting(printable(text, _LINES), indent, len(indent)))
     styled = label if os.environ.get("NO_COLOR") else typer.style(label, fg=color, bold=True)
     typer.echo(f"{styled}: {text}", err=True)

@@ -12,8 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 from typer.core import TyperCommand, TyperOption
 
-from msgflow.cli.header_options import given_of, header_parameter
-from msgflow.cli.operation import escape, parameters_of, set_parameters
+from msgflow.cli.operation import (
+    escape,
+    given_of,
+    header_parameter,
+    parameters_of,
+    set_parameters,
+)
 from msgflow.cli.options import DefaultGroup, one_text, plain
 from msgflow.cli.output import print_lines, print_result
 from msgflow.database import Database
@@ -23,7 +28,7 @@ from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.query.catalogue import choose_query, load_query
 from msgflow.query.selection import KINDS, PATH, columns_of
 from msgflow.result.layout import MOST_ROWS
-from msgflow.result.times import Times
+from msgflow.result.rows import Times
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence, Set

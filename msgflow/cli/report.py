@@ -5,35 +5,29 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated, Unpack
+from typing import Annotated, Any
 
-from msgflow.cli.operation import operation
+from msgflow.cli.operation import extends
 from msgflow.cli.options import LAKE_PAGE, bytes_of
 from msgflow.cli.output import print_note, print_runs, print_status
 from msgflow.cli.ui import require_no_where
 from msgflow.database import Database
 from msgflow.errors import UsageError
-from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
-from msgflow.run.slice import SliceWords
 from msgflow.text.values import count
 
 # Browsers unpack larger pages too slowly.
 _MOST = 1_000_000_000
 
 
-@operation
+@extends(Database.report)
 def command(
+    database: Database,
     *,
     output: Path = Path("msgflow.html"),
-    compare: str | None = None,
-    through: str | None = None,
     max_size: str = "20MB",
     lake: Annotated[str | None, LAKE_PAGE] = None,
     where: str | None = None,
-    targets: Path | None = None,
-    paths: Path = Path(DEFAULT_PATHS),
-    database: Path = DEFAULT_DATABASE,
-    **part: Unpack[SliceWords],
+    **asked: Any,
 ) -> None:
     """Write the pages of a run to one file that any browser opens, without a server.
 
@@ -42,10 +36,8 @@ def command(
 
     Args:
         output (FILE.html|FILE.md): File to write or replace; - writes the page to stdout.
-        through (TEXT): Only paths that contain this text: a topic, or a node.
         max_size (SIZE): Maximum size of the file; what does not fit is left out, and the page says
             so.
-        targets: Requirements, as YAML: the summary has the verdicts on them.
     """
     to_stdout = str(output) == "-"
     is_page = to_stdout or output.suffix.lower() in (".html", ".htm")
@@ -55,10 +47,9 @@ def command(
             "-o FILE.html",
         )
     size = bytes_of(max_size, "--max-size 20MB, at most 1GB", _MOST)
-    given = (*part.values(), compare, through, targets)
     if lake is None:
         require_no_where(where)
-    elif any(value is not None for value in given):
+    elif asked.keys() - {"paths"}:
         raise UsageError("the page of a lake is of all its runs", "--where chooses some of them")
     with TemporaryDirectory() as directory:
         target = Path(directory) / "report.html" if to_stdout else output
@@ -70,16 +61,7 @@ def command(
             notes = page.notes
             status = f"{count(page.runs, 'run')} of {lake} in {target}"
         else:
-            with Database(database) as opened:
-                report = opened.report(
-                    target,
-                    compare=compare,
-                    targets=targets,
-                    paths=paths,
-                    through=through,
-                    max_size=size,
-                    **part,
-                )
+            report = database.report(target, max_size=size, **asked)
             print_runs([report.run])
             notes = report.notes
             status = f"{report.size:,} bytes written to {target}"

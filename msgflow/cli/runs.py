@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated, Unpack
 
 import typer
@@ -15,7 +14,6 @@ from msgflow.cli.options import DefaultGroup
 from msgflow.cli.output import Shown, confirm, is_asked, print_result, print_status
 from msgflow.database import Database
 from msgflow.errors import ExitCode, UsageError
-from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.run.choice import choose_runs
 
 app = typer.Typer(cls=DefaultGroup)
@@ -25,31 +23,28 @@ _Runs = Annotated[str, typer.Argument(metavar="RUN|all", autocompletion=complete
 
 @app.command("list")
 @operation
-def list_runs(*, database: Path = DEFAULT_DATABASE, **shown: Unpack[Shown]) -> None:
+def list_runs(database: Database, **shown: Unpack[Shown]) -> None:
     """List the runs of a database."""
-    with Database(database) as opened:
-        result = opened.query("info", run="all")
     # The rows name the runs already.
-    print_result(replace(result, runs=()), **shown)
+    print_result(replace(database.query("info", run="all"), runs=()), **shown)
 
 
 @app.command("rename")
 @operation
-def rename(run: _Run, name: str, *, database: Path = DEFAULT_DATABASE) -> None:
+def rename(database: Database, run: _Run, name: str) -> None:
     """Give a run another name.
 
     Args:
         run: Name or id of the run.
         name: Its new name.
     """
-    with Database(database) as opened:
-        before = opened.rename_run(run, name)
+    before = database.rename_run(run, name)
     print_status(f"run {before.run_id} renamed: {before.name} is {name}")
 
 
 @app.command("label")
 @operation
-def label(run: _Runs, labels: list[str], *, database: Path = DEFAULT_DATABASE) -> None:
+def label(database: Database, run: _Runs, labels: list[str]) -> None:
     """Say something of a run: which robot, which build.
 
     `runs list` and `info` show it, and --run KEY=VALUE means all runs with that label.
@@ -69,19 +64,17 @@ def label(run: _Runs, labels: list[str], *, database: Path = DEFAULT_DATABASE) -
         if key in values:
             raise UsageError(f"a run has one label of a key — {key}", "give it once")
         values[key] = value or None
-    with Database(database) as opened:
-        changed = opened.label_runs(run, **values)
-    for one in changed:
+    for one in database.label_runs(run, **values):
         print_status(f"run {one.run_id} labelled: {one.name}")
 
 
 @app.command("remove")
 @operation
 def remove(
+    database: Database,
     run: _Runs,
     *,
     yes: Annotated[bool, typer.Option("--yes", "-y")] = False,
-    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Remove a run with all that is known of it; what other runs have stays as it is.
 
@@ -92,13 +85,12 @@ def remove(
         run: Name or id of the run, or all.
         yes: Ask nothing on a terminal either.
     """
-    with Database(database) as opened:
-        if not yes and is_asked():
-            runs = choose_runs(opened.runs(), run)
-            # Other programs can use the database until the user answers.
-            opened.close()
-            if not confirm(f"remove {', '.join(one.title for one in runs)}?"):
-                print_status("nothing was removed")
-                raise typer.Exit(ExitCode.INTERRUPTED)
-        for one in opened.remove_runs(run):
-            print_status(f"run {one.run_id} removed: {one.name}")
+    if not yes and is_asked():
+        runs = choose_runs(database.runs(), run)
+        # Other programs can use the database until the user answers.
+        database.close()
+        if not confirm(f"remove {', '.join(one.title for one in runs)}?"):
+            print_status("nothing was removed")
+            raise typer.Exit(ExitCode.INTERRUPTED)
+    for one in database.remove_runs(run):
+        print_status(f"run {one.run_id} removed: {one.name}")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from msgflow.cli.output import print_text
 from msgflow.export.formats import by_suffix, json_rows
 from msgflow.result.layout import lay_out, screen_width
+from msgflow.result.screen import screen_lines
 from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
@@ -18,26 +18,16 @@ if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
 
 
-class SectionsFormat(StrEnum):
-    """Formats of several tables; the queries write each table in any format."""
-
-    TABLE = "table"
-    JSON = "json"
-    MARKDOWN = "markdown"
-
-
-_SUFFIXES = {
-    ".txt": SectionsFormat.TABLE,
-    ".json": SectionsFormat.JSON,
-    ".md": SectionsFormat.MARKDOWN,
-}
+SectionsFormat = Literal["table", "json", "markdown"]
+"""Formats of several tables; the queries write each table in any format."""
+_SUFFIXES: dict[str, SectionsFormat] = {".txt": "table", ".json": "json", ".md": "markdown"}
 
 
 def chosen_format(form: SectionsFormat | None, output: Path | None) -> SectionsFormat:
     """Return the format that is asked for, else that of the suffix."""
     if form is not None:
         return form
-    return SectionsFormat.TABLE if output is None else by_suffix(output, _SUFFIXES)
+    return "table" if output is None else by_suffix(output, _SUFFIXES)
 
 
 def print_sections(
@@ -48,9 +38,9 @@ def print_sections(
 ) -> None:
     """Print results; `brief` returns the lines of a table of a width, where people read it."""
     form = chosen_format(form, output)
-    if form is SectionsFormat.JSON:
+    if form == "json":
         lines = _json_lines(results)
-    elif form is SectionsFormat.TABLE and brief is not None:
+    elif form == "table" and brief is not None:
         lines = brief(screen_width())
     else:
         lines = _whole_sections(results, form)
@@ -70,8 +60,6 @@ def screen_sections(
     results: Mapping[str, QueryResult], width: int, *, is_chosen: bool = False
 ) -> Iterator[str]:
     """Yield lines for people, none longer than `width` cells."""
-    from msgflow.result.screen import screen_lines
-
     for position, (section, result) in enumerate(results.items()):
         if position:
             yield ""
@@ -91,7 +79,7 @@ def _whole_sections(results: Mapping[str, QueryResult], form: SectionsFormat) ->
     for position, (section, result) in enumerate(results.items()):
         if position:
             yield ""
-        if form is SectionsFormat.MARKDOWN:
+        if form == "markdown":
             yield f"## {section.capitalize()}"
             yield ""
             yield from markdown_lines(result)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
     Write = Callable[[Any], int]
 
-_SIZE = 8
 _ROWS_AT_ONCE = 100_000
 # The server holds an answer as a whole, and so does the browser.
 MOST_BYTES = 100_000_000
@@ -27,7 +27,7 @@ MOST_BYTES = 100_000_000
 def answer(
     write: Write, *, path: str, memory_limit: str | None, text: str, limit: int | None
 ) -> None:
-    """Write the result of `Database.sql`, in the child: notes as JSON, then rows."""
+    """Write the result of `Database.sql`, in the child; metadata of its table have the notes."""
     import pyarrow as pa
 
     with Database(path, memory_limit=memory_limit or default_limit()) as database:
@@ -40,12 +40,8 @@ def answer(
                 f"the first {len(table)} of {len(result)} rows: all take"
                 f" {result.table.nbytes / 1e6:,.0f} MB, and a page shows {MOST_BYTES / 1e6:.0f} MB"
             )
-        notes = json.dumps(said).encode()
-        write(len(notes).to_bytes(_SIZE) + notes)
-        with (
-            pa.PythonFile(_Stream(write), "w") as stream,
-            pa.ipc.new_stream(stream, table.schema) as writer,
-        ):
+        table = table.replace_schema_metadata({"notes": json.dumps(said)})
+        with pa.ipc.new_stream(_Stream(write), table.schema) as writer:
             writer.write_table(table, max_chunksize=_ROWS_AT_ONCE)
 
 
@@ -85,9 +81,10 @@ class WarmSql:
                 "limit": limit,
             },
         )
-        start = _SIZE + int.from_bytes(content[:_SIZE])
-        with pa.ipc.open_stream(pa.py_buffer(content)[start:]) as reader:
-            return QueryResult(reader.read_all(), notes=json.loads(content[_SIZE:start]))
+        with pa.ipc.open_stream(pa.py_buffer(content)) as reader:
+            table = reader.read_all()
+        notes = json.loads(table.schema.metadata[b"notes"])
+        return QueryResult(table.replace_schema_metadata(None), notes=notes)
 
     def interrupt(self) -> None:
         """End the query that runs; for another thread than the one that waits for it."""
@@ -100,15 +97,12 @@ class WarmSql:
             self._process.close()
 
 
-class _Stream:
-    closed = False
-
+class _Stream(io.RawIOBase):
     def __init__(self, write: Write) -> None:
-        self.write = write
+        self._write = write
 
-    def flush(self) -> None:
-        """Do nothing: what was written is on its way."""
+    def write(self, data: Any) -> int:
+        return self._write(data)
 
-    def close(self) -> None:
-        """End the file."""
-        self.closed = True
+    def writable(self) -> bool:
+        return True

@@ -19,7 +19,7 @@ from msgflow.cli.output import (
 )
 from msgflow.database import Database
 from msgflow.errors import UsageError
-from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_LINKS, DEFAULT_PATHS
+from msgflow.files.default_files import DEFAULT_LINKS, DEFAULT_PATHS
 from msgflow.text.values import count
 
 app = typer.Typer()
@@ -31,11 +31,11 @@ _TARGETS = "targets.yaml"
 @app.command("links")
 @operation
 def links(
+    database: Database,
     *,
     run: str | None = None,
     apply: bool = False,
     output: Path | None = None,
-    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Print links that the data suggest, as a file to review.
 
@@ -61,47 +61,43 @@ def links(
     path = output or (DEFAULT_LINKS if apply else None)
     words = ["msgflow", "links", "apply", str(path or "FILE")]
     words += ["--run", run] if run is not None else []
-    words += database_option(database)
-    with Database(database) as opened:
-        found = opened.suggest_links(run=run)
-        print_runs(found.runs)
-        if found.doubtful:
-            print_note(
-                f"{len(found.doubtful)} of {count(len(found.candidates), 'candidate')} are"
-                " doubtful, see the comments: "
-                + ", ".join(dict.fromkeys(row["node"] for row in found.doubtful))
-            )
-        text = found.text(shlex.join(words))
-        if path is None or not apply or not found.certain:
-            print_text(text, path)
-            if apply:
-                print_status("no candidate is without a doubt: nothing is declared")
-            elif path is None and found.certain:
-                print_next([*_SUGGEST, "links", "--apply"], database, run)
-            return
-        with replacing(path) as temporary:
-            temporary.write_text(f"{text}\n", encoding="utf-8")
-            applied = opened.apply_links(path, run=run, content=text)
-        for row in found.certain:
-            print_status(
-                f"{row['node']}: {', '.join(row['inputs'])} → {', '.join(row['outputs'])}"
-                f" ({row['kind']})"
-            )
-        for one in applied:
-            print_applied(opened, one)
-        print_status(f"written to {path}")
+    words += database_option(database.path)
+    found = database.suggest_links(run=run)
+    print_runs(found.runs)
+    if found.doubtful:
+        print_note(
+            f"{len(found.doubtful)} of {count(len(found.candidates), 'candidate')} are"
+            " doubtful, see the comments: "
+            + ", ".join(dict.fromkeys(row["node"] for row in found.doubtful))
+        )
+    text = found.text(shlex.join(words))
+    if path is None or not apply or not found.certain:
+        print_text(text, path)
+        if apply:
+            print_status("no candidate is without a doubt: nothing is declared")
+        elif path is None and found.certain:
+            print_next([*_SUGGEST, "links", "--apply"], database.path, run)
+        return
+    with replacing(path) as temporary:
+        temporary.write_text(f"{text}\n", encoding="utf-8")
+        applied = database.apply_links(path, run=run, content=text)
+    for row in found.certain:
+        print_status(
+            f"{row['node']}: {', '.join(row['inputs'])} → {', '.join(row['outputs'])}"
+            f" ({row['kind']})"
+        )
+    for one in applied:
+        print_applied(database, one)
+    print_status(f"written to {path}")
 
 
 @app.command("paths")
 @operation
-def paths(
-    *, run: str | None = None, output: Path | None = None, database: Path = DEFAULT_DATABASE
-) -> None:
+def paths(database: Database, *, run: str | None = None, output: Path | None = None) -> None:
     """Print the paths of a run as a file with names, to choose from: paths.yaml."""
     from msgflow.paths.suggested_paths import suggest_paths
 
-    with Database(database) as opened:
-        result = opened.query("e2e-latency", run=run)
+    result = database.query("e2e-latency", run=run)
     print_runs(result.runs)
     text = suggest_paths(result.to_arrow().to_pylist())
     for note in result.notes:
@@ -109,18 +105,18 @@ def paths(
             print_note(note)
     print_text(text, output)
     if output is None:
-        print_next([*_SUGGEST, "paths", "-o", str(DEFAULT_PATHS)], database, run)
+        print_next([*_SUGGEST, "paths", "-o", str(DEFAULT_PATHS)], database.path, run)
 
 
 @app.command("targets")
 @operation
 def targets(
+    database: Database,
     *,
     run: str | None = None,
     start: str | None = None,
     margin: Annotated[float, typer.Option(min=0)] = 20.0,
     output: Path | None = None,
-    database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Print requirements that a good run meets, as a file to review: -o targets.yaml.
 
@@ -131,8 +127,7 @@ def targets(
     Args:
         margin (PERCENT): How much more than measured is allowed.
     """
-    with Database(database) as opened:
-        text = opened.suggest_targets(run=run, start=start, margin=margin / 100)
+    text = database.suggest_targets(run=run, start=start, margin=margin / 100)
     print_text(text, output)
     for line in text.splitlines()[1:]:
         if line.startswith("# "):
@@ -140,7 +135,7 @@ def targets(
     if text.endswith("targets: []"):
         print_note("nothing was measured often enough to suggest a requirement for it")
     elif output is None:
-        print_next([*_SUGGEST, "targets", "-o", _TARGETS], database, run)
+        print_next([*_SUGGEST, "targets", "-o", _TARGETS], database.path, run)
     else:
         # Another run is what they are for.
-        print_next(["msgflow", "verify", str(output)], database)
+        print_next(["msgflow", "verify", str(output)], database.path)

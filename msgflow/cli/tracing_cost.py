@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgflow.text.values import ARROW, format_duration
 
@@ -18,52 +18,51 @@ _EVENTS_OF_HOP = 12
 _MOST_PATHS = 3
 _TRACED = """
 SELECT
-    run_id, list(path) AS paths, sum(event_count)::BIGINT AS events,
-    max(end_ns) - min(start_ns) AS took_ns
-FROM main.trace
-WHERE domain = 'ust'
-GROUP BY run_id
+    run.run_id, coalesce(list(trace.path) FILTER (trace.path IS NOT NULL), []) AS paths,
+    sum(trace.event_count)::BIGINT AS events, max(trace.end_ns) - min(trace.start_ns) AS took_ns
+FROM main.run
+LEFT JOIN main.trace ON trace.run_id = run.run_id AND trace.domain = 'ust'
+GROUP BY run.run_id
 """
 
 
 def share_of_cpu(database: Database, runs: Sequence[Run]) -> Iterator[str]:
     """Yield a sentence for each run: what share of a CPU its events took."""
-    from msgflow.record.event_cost import USUAL_NS
-
+    traced = _traced(database)
     for run in runs:
-        events, took_ns, measured = _traced(database, run.run_id)
-        if events and took_ns:
-            each = USUAL_NS if measured is None else measured
-            where = "elsewhere" if measured is None else "there, before the recording"
+        row = traced[run.run_id]
+        if row["events"] and row["took_ns"]:
+            where = "there, before the recording" if row["is_measured"] else "elsewhere"
             label = f"run {run.title}: " if len(runs) > 1 else ""
+            share = 100 * row["events"] * row["cost_ns"] / row["took_ns"]
             yield (
-                f"{label}tracing took about {100 * events * each / took_ns:.2g} % of a CPU:"
-                f" {events:,} events, {each:.0f} ns each (measured {where})"
+                f"{label}tracing took about {share:.2g} % of a CPU:"
+                f" {row['events']:,} events, {row['cost_ns']:.0f} ns each (measured {where})"
             )
 
 
 def part_of_latencies(database: Database, latencies: QueryResult) -> Iterator[str]:
     """Yield a sentence about the paths with the longest latencies, of rows of e2e-latency."""
-    from msgflow.record.event_cost import USUAL_NS
-
+    traced = _traced(database)
     columns = ["run_id", "path", "median_ns"]
     rows = [row for row in latencies.to_arrow().select(columns).to_pylist() if row["median_ns"]]
     parts = []
     for row in sorted(rows, key=lambda row: -row["median_ns"])[:_MOST_PATHS]:
-        *_, measured = _traced(database, row["run_id"])
-        hops = row["path"].count(ARROW) // 2
-        tracing = format_duration(
-            hops * _EVENTS_OF_HOP * (USUAL_NS if measured is None else measured)
-        )
-        topic = row["path"].split(ARROW)[-2]
-        parts.append(f"{tracing} of {topic}'s {format_duration(row['median_ns'])}")
+        steps = row["path"].split(ARROW)
+        cost_ns = traced[row["run_id"]]["cost_ns"]
+        tracing = format_duration((len(steps) - 1) // 2 * _EVENTS_OF_HOP * cost_ns)
+        parts.append(f"{tracing} of {steps[-2]}'s {format_duration(row['median_ns'])}")
     if parts:
         yield f"of the latencies, tracing is about {', '.join(parts)}"
 
 
-def _traced(database: Database, run: int) -> tuple[int | None, int | None, float | None]:
-    from msgflow.record.event_cost import event_cost_ns
+def _traced(database: Database) -> dict[int, dict[str, Any]]:
+    """Return, by run, its events, how long it took, and what an event cost."""
+    from msgflow.record.event_cost import USUAL_NS, event_cost_ns
 
-    rows = database.sql(_TRACED, limit=None).table.to_pylist()
-    row = next((row for row in rows if row["run_id"] == run), {"events": None, "took_ns": None})
-    return row["events"], row["took_ns"], event_cost_ns(row.get("paths") or [])
+    found = {}
+    for row in database.sql(_TRACED, limit=None).table.to_pylist():
+        measured = event_cost_ns(row["paths"])
+        cost = USUAL_NS if measured is None else measured
+        found[row["run_id"]] = row | {"cost_ns": cost, "is_measured": measured is not None}
+    return found

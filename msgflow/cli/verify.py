@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import typer
 
@@ -18,22 +17,12 @@ if TYPE_CHECKING:
     from msgflow.verify.verify import Verification
 
 
-class VerifyFormat(StrEnum):
-    """Formats of verdicts."""
-
-    TABLE = "table"
-    JSON = "json"
-    CSV = "csv"
-    MARKDOWN = "markdown"
-    JUNIT = "junit"
-
-
 @asks(Database.verify)
 def command(
     verification: Verification,
     *,
     allow_not_measured: bool = False,
-    form: VerifyFormat | None = None,
+    form: Literal["table", "json", "csv", "markdown", "junit"] | None = None,
     output: Path | None = None,
     wide: bool = False,
 ) -> None:
@@ -48,16 +37,16 @@ def command(
     from msgflow.verify.verify import Verdict
 
     if form is None and output is not None and output.suffix.lower() == ".xml":
-        form = VerifyFormat.JUNIT
-    if form is VerifyFormat.JUNIT:
+        form = "junit"
+    if form == "junit":
         print_runs([verification.run])
         text = verification.to_junit(allow_not_measured=allow_not_measured)
         print_text(text, output)
     else:
-        chosen = None if form is None else Format(form.value)
+        chosen = None if form is None else Format(form)
         print_result(verification.result, chosen, output, wide=wide)
     # A table has what failed; of what has no value, it may lack room for the reason.
-    for line in verification.unmet(with_value=form is VerifyFormat.JUNIT or output is not None):
+    for line in verification.unmet(with_value=form == "junit" or output is not None):
         print_status(line)
     numbers = {verdict: verification.count(verdict) for verdict in Verdict}
     print_status(", ".join(f"{number} {verdict}" for verdict, number in numbers.items()))

@@ -21,6 +21,7 @@ from typer.core import TyperCommand
 from msgflow.cli.operation import operation
 from msgflow.cli.options import path_of
 from msgflow.cli.output import is_screen, print_lines, print_note, print_status
+from msgflow.database import named_places
 from msgflow.errors import ExitCode, TraceError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.run.window import duration_ns
@@ -273,17 +274,11 @@ def _published(reports: Iterator[WindowReport], publisher: Diagnostics) -> Itera
 
 
 def _alarm(targets: Path, paths: Path, *, with_flows: bool) -> Alarm:
-    from msgflow.paths.paths_file import read_paths
     from msgflow.verify.targets_file import read_targets
     from msgflow.watch.alarm import Alarm
 
     file = read_targets(targets)
-    named = [target.path_name.value for target in file.targets if target.path_name is not None]
-    places = {}
-    if named:
-        known = read_paths(paths)
-        places = {name: known.named(name).words() for name in named}
-    return Alarm(file, places, print_note, with_flows=with_flows)
+    return Alarm(file, named_places(file, paths), print_note, with_flows=with_flows)
 
 
 def _free(name: str) -> Path:

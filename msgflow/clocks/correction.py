@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 
 from msgflow.clocks.clocks_file import FIELDS
 from msgflow.db.derivation import derive_from_clocks
-from msgflow.db.runs import change_runs
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
     import duckdb
 
@@ -43,17 +41,13 @@ WHERE clock_id = $clock_id
 
 
 def apply_clocks(
-    path: Path, sync: ClockSync, *, run: str | int | None, memory_limit: str | None = None
+    con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...], sync: ClockSync
 ) -> tuple[Run, ...]:
-    """Correct the clocks of runs anew, in one transaction; see `Database.apply_clocks`."""
-
-    def apply(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[Run, ...]:
-        for run in runs:
-            set_clocks(con, run.run_id, sync)
-            derive_from_clocks(con, run.run_id)
-        return runs
-
-    return change_runs(path, run, apply, memory_limit=memory_limit)
+    """Correct the clocks of runs anew; see `Database.apply_clocks`."""
+    for run in runs:
+        set_clocks(con, run.run_id, sync)
+        derive_from_clocks(con, run.run_id)
+    return runs
 
 
 def set_clocks(con: duckdb.DuckDBPyConnection, run_id: int, sync: ClockSync) -> None:

@@ -50,66 +50,52 @@ def change_runs(
         return interruptible(con, changed)
 
 
-def remove_runs(path: Path, run: str | int, *, memory_limit: str | None = None) -> tuple[Run, ...]:
+def remove_runs(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[Run, ...]:
     """Delete runs with all their rows, and return them; see `Database.remove_runs`."""
-
-    def change(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[Run, ...]:
-        delete(con, [one.run_id for one in runs])
-        return runs
-
-    return change_runs(path, run, change, memory_limit=memory_limit)
+    delete(con, [one.run_id for one in runs])
+    return runs
 
 
-def rename_run(path: Path, run: str | int, name: str, *, memory_limit: str | None = None) -> Run:
-    """Give a run another name, and return the run as it was; see `Database.rename_run`."""
+def rename_run(
+    con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...], wanted: str | int, name: str
+) -> Run:
+    """Give the run that is wanted another name; see `Database.rename_run`."""
     require_run_name(name)
-
-    def change(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> Run:
-        if len(runs) > 1:
-            raise UsageError(f"one run has one name — {run}", "give a name or an id")
-        named = con.execute("SELECT run_id FROM store.run WHERE name = ?", [name]).fetchall()
-        if any(run_id != runs[0].run_id for (run_id,) in named):
-            raise UsageError(
-                f"the database has a run of that name already — {name}",
-                "give another name; msgflow runs list has those that are taken",
-            )
-        con.execute("UPDATE store.run SET name = ? WHERE run_id = ?", [name, runs[0].run_id])
-        return runs[0]
-
-    return change_runs(path, run, change, memory_limit=memory_limit)
+    if len(runs) > 1:
+        raise UsageError(f"one run has one name — {wanted}", "give a name or an id")
+    named = con.execute("SELECT run_id FROM store.run WHERE name = ?", [name]).fetchall()
+    if any(run_id != runs[0].run_id for (run_id,) in named):
+        raise UsageError(
+            f"the database has a run of that name already — {name}",
+            "give another name; msgflow runs list has those that are taken",
+        )
+    con.execute("UPDATE store.run SET name = ? WHERE run_id = ?", [name, runs[0].run_id])
+    return runs[0]
 
 
 def label_runs(
-    path: Path,
-    run: str | int,
-    labels: Mapping[str, str | None],
-    *,
-    memory_limit: str | None = None,
+    con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...], labels: Mapping[str, str | None]
 ) -> tuple[Run, ...]:
     """Give runs labels, or take them away (None), and return the runs as they were."""
     for key, value in labels.items():
         require_label(key, value)
-
-    def change(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[Run, ...]:
-        for one in runs:
-            now = dict(label.partition("=")[::2] for label in one.labels)
-            for key, value in labels.items():
-                if value is not None:
-                    now[key] = value
-                elif now.pop(key, None) is None:
-                    raise UsageError(
-                        f"run {one.run_id} has no label of this key — {key}",
-                        f"its labels are {', '.join(one.labels)}"
-                        if one.labels
-                        else f"msgflow runs label {one.run_id} {key}=VALUE",
-                    )
-            con.execute(
-                "UPDATE store.run SET labels = ? WHERE run_id = ?",
-                [sorted(f"{key}={value}" for key, value in now.items()) or None, one.run_id],
-            )
-        return runs
-
-    return change_runs(path, run, change, memory_limit=memory_limit)
+    for one in runs:
+        now = dict(label.partition("=")[::2] for label in one.labels)
+        for key, value in labels.items():
+            if value is not None:
+                now[key] = value
+            elif now.pop(key, None) is None:
+                raise UsageError(
+                    f"run {one.run_id} has no label of this key — {key}",
+                    f"its labels are {', '.join(one.labels)}"
+                    if one.labels
+                    else f"msgflow runs label {one.run_id} {key}=VALUE",
+                )
+        con.execute(
+            "UPDATE store.run SET labels = ? WHERE run_id = ?",
+            [sorted(f"{key}={value}" for key, value in now.items()) or None, one.run_id],
+        )
+    return runs
 
 
 def require_label(key: str, value: str | None) -> None:

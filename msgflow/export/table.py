@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
-from msgflow.result.cells import cells
+from msgflow.result.rows import cells
 from msgflow.text.markdown import markdown_line, rule_line
 
 if TYPE_CHECKING:

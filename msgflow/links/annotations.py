@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 
 from msgflow.db.derivation import derive, learn_topics
-from msgflow.db.runs import change_runs
 from msgflow.links.matching import match_links, matches
 from msgflow.sql.statement import internal_sql, registered
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-    from pathlib import Path
 
     import duckdb
 
@@ -48,23 +46,19 @@ class AppliedLinks:
 
 
 def apply_links(
-    path: Path, file: LinksFile, *, run: str | int | None, memory_limit: str | None = None
+    con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...], file: LinksFile
 ) -> tuple[AppliedLinks, ...]:
     """Declare the links of a file for runs of a database and derive their links anew."""
-
-    def apply(con: duckdb.DuckDBPyConnection, runs: tuple[Run, ...]) -> tuple[AppliedLinks, ...]:
-        counts = {run.run_id: declare_links(con, run.run_id, file) for run in runs}
-        for run in runs:
-            derive(con, run.run_id)
-        applied = []
-        for run in runs:
-            sources = internal_sql().run(con, "link_source", {"run_id": run.run_id})
-            ((of_file, of_trace),) = sources.fetchall()
-            sentences = tuple(_without_effect(con, run.run_id))
-            applied.append(AppliedLinks(run, *counts[run.run_id], of_file, of_trace, sentences))
-        return tuple(applied)
-
-    return change_runs(path, run, apply, memory_limit=memory_limit)
+    counts = {run.run_id: declare_links(con, run.run_id, file) for run in runs}
+    for run in runs:
+        derive(con, run.run_id)
+    applied = []
+    for run in runs:
+        sources = internal_sql().run(con, "link_source", {"run_id": run.run_id})
+        ((of_file, of_trace),) = sources.fetchall()
+        sentences = tuple(_without_effect(con, run.run_id))
+        applied.append(AppliedLinks(run, *counts[run.run_id], of_file, of_trace, sentences))
+    return tuple(applied)
 
 
 def declare_links(

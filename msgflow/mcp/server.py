@@ -22,6 +22,9 @@ from msgflow.confined.process import ConfinedProcess
 from msgflow.database import Database
 from msgflow.db.memory import bound_process
 from msgflow.errors import MsgflowError, QueryError, UsageError
+from msgflow.export.flow import tree_text
+from msgflow.export.formats import json_rows
+from msgflow.query.catalogue import load_queries, load_query, query_names
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -127,8 +130,6 @@ class _Tools:
 
     def list_queries(self, name: str | None = None) -> str:
         """List the named queries; with a name, explain that query: parameters and columns."""
-        from msgflow.query.catalogue import load_queries, load_query
-
         if name is None:
             titles = ({"name": query.words, "title": query.title} for query in load_queries())
             return _answer((), map(json.dumps, titles))
@@ -207,8 +208,6 @@ class _Tools:
         Give a topic (at: first message at or after that time, seconds from the start of the run) or
         one of the ids. direction: 'forward', 'backward' or 'both'.
         """
-        from msgflow.export.flow import tree_text
-
         with self._opened() as database:
             flow = database.flow(
                 topic,
@@ -239,8 +238,6 @@ class _Tools:
         place: topic or node where the flows end; by default all ends. run, start,
         end: as for run_query.
         """
-        from msgflow.export.formats import json_rows
-
         with self._opened() as database:
             found = database.why(place, run=run, start=start, end=end)
         rows = (
@@ -331,16 +328,12 @@ def _refuse_unknown(tool: str, arguments: dict[str, Any], known: Sequence[str]) 
 
 def _parameters_of(query: object) -> list[str]:
     """Return the names of a query's parameters; of none where there is no such query."""
-    from msgflow.query.catalogue import load_query, query_names
-
     if not isinstance(query, str) or query not in query_names():
         return []
     return [param.name for param in load_query(query).params]
 
 
 def _own(name: str, parameters: dict[str, Any]) -> dict[str, Any]:
-    from msgflow.query.catalogue import load_query
-
     known = [param.name for param in load_query(name).params]
     for word in parameters:
         if word not in known:
@@ -377,8 +370,6 @@ def _capped(limit: int) -> int:
 
 
 def _rows(result: QueryResult, limit: int = DEFAULT_ROWS) -> str:
-    from msgflow.export.formats import json_rows
-
     most = _capped(limit)
     notes = list(result.notes)
     if len(result) > most:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
-from msgflow.result.cells import is_number
+from msgflow.result.rows import is_number
 from msgflow.text.values import ARROW, MOMENT, NULL, column_title, format_cell, short_symbol
 from msgflow.text.wrapping import longest_piece, longest_word, wrap
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
     from msgflow.result.rows import Rows
+    from msgflow.sql.header import Header
 
 MOST_ROWS = 50
 _NARROWEST = 40
@@ -89,32 +90,32 @@ def lay_out(
     remedy: str = "--wide shows all",
 ) -> Layout:
     """Return the layout of a result."""
-    keeps_all = is_chosen or result.header is None
+    # Without it, all columns are kept.
+    header = None if is_chosen else result.header
     zero_rows = 0
-    if not keeps_all:
-        result, zero_rows = _without_zero_rows(result)
-    kept, nothing = _columns_with_content(result, keeps_all)
+    if header is not None:
+        result, zero_rows = _without_zero_rows(result, header)
+    kept, nothing = _columns_with_content(result, header)
     first = result.table if most_rows is None else result.table.slice(0, most_rows)
     lines = _LINES_OF_ALL if is_whole or result.header is None else _LINES
     columns = [_column(result, name, first[name], lines) for name in kept]
     columns, paths = _with_numbered_paths(columns, result.path_numbers)
     headings: tuple[str, ...] = ()
-    if not keeps_all:
-        columns, headings = _with_headings(result, columns)
+    if header is not None:
+        columns, headings = _with_headings(header, columns)
     notes = []
     if first.num_rows < len(result):
         notes.append(f"the first {first.num_rows} of {len(result):,} rows: {remedy}")
-    if keeps_all or is_whole:
-        shown = columns if _least_width(columns) <= width else _with_broken_names(columns)
+    if header is not None and not is_whole:
+        shown = _columns_that_fit(header, result.order, columns, width)
     else:
-        shown = _columns_that_fit(result, columns, width)
+        shown = columns if _least_width(columns) <= width else _with_broken_names(columns)
     names = {column.name for column in shown}
     left_out = [column for column in columns if column.name not in names]
     is_table = _least_width(shown) <= width and not (left_out and first.num_rows == 1)
-    if not keeps_all:
-        brief = () if result.header is None else (*result.order, *result.header.brief)[:_ESSENTIAL]
-        important = [column for column in columns if column.name in brief]
-        is_table = is_table and all(column.name in names for column in important)
+    if header is not None:
+        important = {*(*result.order, *header.brief)[:_ESSENTIAL]}
+        is_table = is_table and important.isdisjoint(column.name for column in left_out)
     if not is_table:
         shown, left_out = columns, []
     widths = tuple(_widths(shown, width)) if is_table else None
@@ -122,30 +123,28 @@ def lay_out(
     return Layout(headings, tuple(shown), widths, paths, tuple(notes), not_shown)
 
 
-def _without_zero_rows(result: Rows) -> tuple[Rows, int]:
+def _without_zero_rows(result: Rows, header: Header) -> tuple[Rows, int]:
     """Return the rows that are not 0 throughout, and how many are; all if each of them is."""
-    name = None if result.header is None else result.header.zero
-    if name is None or name not in result.columns:
+    if header.zero is None or header.zero not in result.columns:
         return result, 0
     from pyarrow import compute
 
-    table = result.table.filter(compute.not_equal(result.table[name], 0))
+    table = result.table.filter(compute.not_equal(result.table[header.zero], 0))
     count = len(result) - table.num_rows
     return (replace(result, table=table), count) if table.num_rows else (result, 0)
 
 
-def _columns_with_content(result: Rows, keeps_all: bool) -> tuple[list[str], list[str]]:
+def _columns_with_content(result: Rows, header: Header | None) -> tuple[list[str], list[str]]:
     """Return the columns with content, and the titles of those that are 0 or empty in all rows."""
-    if keeps_all or not len(result):
+    if header is None or not len(result):
         return list(result.columns), []
-    answer = () if result.header is None else result.header.answer
     kept, nothing = [], []
     for name in result.columns:
         if name == RUN and len(result.runs) == 1:
             continue
         if name == PATH_ID and PATH in result.columns:
             continue
-        if name not in answer and _is_nothing(result.table[name]):
+        if name not in header.answer and _is_nothing(result.table[name]):
             nothing.append(_title(result, name))
         else:
             kept.append(name)
@@ -243,13 +242,12 @@ def _with_numbered_paths(
 
 
 def _with_headings(
-    result: Rows, columns: list[ShownColumn]
+    header: Header, columns: list[ShownColumn]
 ) -> tuple[list[ShownColumn], tuple[str, ...]]:
     """Return the columns of the table, and the headings made of the other ones."""
     by_name = {column.name: column for column in columns}
-    names = () if result.header is None else result.header.heading
-    said = [by_name[name] for name in names if name in by_name]
-    if len(said) < 2 or said[0].name != names[0] or not said[0].cells:
+    said = [by_name[name] for name in header.heading if name in by_name]
+    if len(said) < 2 or said[0].name != header.heading[0] or not said[0].cells:
         return columns, ()
     key, *others = said
     rows: dict[str, tuple[str, ...]] = {}
@@ -272,16 +270,15 @@ def _with_headings(
     return left, lines
 
 
-def _by_importance(result: Rows, columns: list[ShownColumn]) -> list[ShownColumn]:
+def _by_importance(
+    header: Header, order: Sequence[str], columns: list[ShownColumn]
+) -> list[ShownColumn]:
     """Return the columns, the most important first; those alike in all rows come last."""
-    header = result.header
-    brief = () if header is None else header.brief
-    others = [name for name in brief if name not in (PATH, RUN)]
+    others = [name for name in header.brief if name not in (PATH, RUN)]
     # Rows whose order nothing explains look like a mistake.
-    slowest = () if header is None or header.slowest is None else (header.slowest,)
-    order = (*result.order, *slowest)
-    kept = {PATH, RUN, *order, *others[:_WANTED], *(() if header is None else header.answer)}
-    places = {name: place for place, name in enumerate(dict.fromkeys((PATH, RUN, *order, *brief)))}
+    first = (PATH, RUN, *order, *([] if header.slowest is None else [header.slowest]))
+    kept = {*first, *others[:_WANTED], *header.answer}
+    places = {name: place for place, name in enumerate(dict.fromkeys((*first, *header.brief)))}
     return sorted(
         columns,
         key=lambda column: (
@@ -292,11 +289,13 @@ def _by_importance(result: Rows, columns: list[ShownColumn]) -> list[ShownColumn
     )
 
 
-def _columns_that_fit(result: Rows, columns: list[ShownColumn], width: int) -> list[ShownColumn]:
+def _columns_that_fit(
+    header: Header, order: Sequence[str], columns: list[ShownColumn], width: int
+) -> list[ShownColumn]:
     """Return the most important columns that fit, in the order of the result."""
     if _least_width(columns) <= width:
         return columns
-    ranked = _by_importance(result, columns)
+    ranked = _by_importance(header, order, columns)
     chosen = _as_many_as_fit(ranked, width)
     # Paths and runs are shown besides those of `brief`.
     first = ranked[: _WANTED + sum(column.name in (PATH, RUN) for column in columns)]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
-from msgflow.result.rows import Rows
+from msgflow.result.rows import Rows, Times
 from msgflow.text.name_suggestions import column_named
 from msgflow.version import __version__
 
@@ -60,20 +60,19 @@ class QueryResult(Rows):
         Raises:
             UsageError: no such form, or the rows do not say which columns are times.
         """
-        from msgflow.result.times import Times, converted
+        from msgflow.result.times import converted
 
-        try:
-            form = Times(times)
-        except ValueError:
+        known = get_args(Times)
+        if times not in known:
             raise UsageError(
-                f"there are no such times — {times}", f"choose one of {', '.join(Times)}"
-            ) from None
-        if self.header is None and form is not Times.NS:
+                f"there are no such times — {times}", f"choose one of {', '.join(known)}"
+            )
+        if self.header is None and times != "ns":
             raise UsageError(
                 "plain SQL does not say which numbers are times",
                 "use a query: msgflow query",
             )
-        return replace(self, table=converted(self.table, self.units, self.runs, form))
+        return replace(self, table=converted(self.table, self.units, self.runs, times))
 
     def with_columns(self, names: Sequence[str]) -> QueryResult:
         """Return the rows with these columns only, in this order.

@@ -6,8 +6,8 @@ from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING
 
-from msgflow.result.cells import cells
 from msgflow.result.layout import MOST_ROWS, lay_out, screen_width
+from msgflow.result.rows import cells
 from msgflow.result.screen import screen_lines
 from msgflow.text.values import printable
 from msgflow.text.wrapping import wrap

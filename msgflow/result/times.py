@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from typing import TYPE_CHECKING, Any
+
+import numpy
+import pyarrow
+from pyarrow import compute
 
 from msgflow.errors import UsageError
 from msgflow.run.simulated import known_moments
@@ -11,29 +14,17 @@ from msgflow.run.simulated import known_moments
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    import pyarrow as pa
-
     from msgflow.run.choice import Run
 
 _NS = "_ns"
 _SECOND = 1e9
 
 
-class Times(StrEnum):
-    """How times are written; with all but `ns`, durations are in seconds."""
-
-    NS = "ns"
-    SECONDS = "seconds"
-    RELATIVE = "relative"
-    SIM = "sim"
-    ISO = "iso"
-
-
 def converted(
-    table: pa.Table, units: Mapping[str, str], runs: Sequence[Run], times: Times
-) -> pa.Table:
+    table: pyarrow.Table, units: Mapping[str, str], runs: Sequence[Run], times: str
+) -> pyarrow.Table:
     """Return rows with their times in another form; `_ns` becomes `_s` or `_utc` in names."""
-    if times is Times.NS:
+    if times == "ns":
         return table
     columns, names = [], []
     for name, column in zip(table.column_names, table.columns, strict=True):
@@ -46,38 +37,26 @@ def converted(
         renamed = name.removesuffix(_NS) + suffix if name.endswith(_NS) and suffix else name
         columns.append(column)
         names.append(renamed if renamed not in table.column_names else name)
-    import pyarrow
-
     return pyarrow.table(columns, names=names)
 
 
-def _moment(column: Any, times: Times, table: pa.Table, runs: Sequence[Run]) -> tuple[Any, str]:
-    import pyarrow
-    from pyarrow import compute
-
-    if times is Times.SECONDS:
+def _moment(column: Any, times: str, table: pyarrow.Table, runs: Sequence[Run]) -> tuple[Any, str]:
+    if times == "seconds":
         return _seconds(column), "_s"
-    if times is Times.RELATIVE:
+    if times == "relative":
         return _seconds(compute.subtract(column, _starts(table, runs))), "_s"
-    if times is Times.SIM:
+    if times == "sim":
         return _simulated(column, known_moments(runs)), "_s"
     stamps = column.cast(pyarrow.timestamp("ns"))
     return compute.strftime(stamps, format="%Y-%m-%dT%H:%M:%SZ"), "_utc"
 
 
 def _seconds(column: Any) -> Any:
-    import pyarrow
-    from pyarrow import compute
-
     return compute.divide(column.cast(pyarrow.float64(), safe=False), _SECOND)
 
 
 def _simulated(column: Any, moments: Sequence[tuple[int, int]]) -> Any:
     """Return seconds of simulated time."""
-    import numpy
-    import pyarrow
-    from pyarrow import compute
-
     origin = moments[0][0]
     recorded = numpy.array([at - origin for at, _ in moments], dtype=numpy.float64)
     simulated = numpy.array([then for _, then in moments], dtype=numpy.float64)
@@ -88,10 +67,7 @@ def _simulated(column: Any, moments: Sequence[tuple[int, int]]) -> Any:
     return pyarrow.array(found / _SECOND, from_pandas=True)
 
 
-def _starts(table: pa.Table, runs: Sequence[Run]) -> Any:
-    import pyarrow
-    from pyarrow import compute
-
+def _starts(table: pyarrow.Table, runs: Sequence[Run]) -> Any:
     starts = {run.run_id: run.start_ns for run in runs}
     if "run_id" in table.column_names and len(starts) > 1:
         place = compute.index_in(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from msgflow.result.cells import cells
+from msgflow.result.rows import cells
 from msgflow.text.markdown import code, code_lines, markdown_line, rule_line
 from msgflow.text.shell import shell_joined
 from msgflow.text.values import format_cell

@@ -12,7 +12,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from msgflow.cli.operation import asks, operation
+from msgflow.cli.operation import asks, extends, operation
 from msgflow.database import Database
 from msgflow.run.slice import SliceWords, TimeWords
 
@@ -107,6 +107,26 @@ def test_a_command_asks_a_method_of_the_database(monkeypatch: pytest.MonkeyPatch
     words = ("--db=x.duckdb", "-o", "there", "--run=1", "--end=3", "--loud")
     assert asked(command, *words) == str((given, Path("there"), True))
     assert command.__doc__ == "Write it.\n\nSay it."
+
+
+def test_a_command_gets_its_database_and_what_a_method_takes() -> None:
+    def method(
+        self: Database, place: str | None = None, *, take_id: int | None = None, depth: int = 3
+    ) -> None:
+        """Ask."""
+
+    @extends(method)
+    def command(database: Database, *, depth: str = "far", **asked: Any) -> None:
+        typer.echo((database.path, depth, asked))
+
+    @operation
+    def alone(database: Database, name: str) -> None:
+        typer.echo((database.path, name))
+
+    given = {"place": "x", "take_id": 3}
+    assert asked(command, "x", "--take=3", "--db=y.duckdb") == str((Path("y.duckdb"), "far", given))
+    assert asked(command, "--depth=2") == str((Path("msgflow.duckdb"), "2", {}))
+    assert asked(alone, "n", "--db=y.duckdb") == str((Path("y.duckdb"), "n"))
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import duckdb
@@ -12,10 +13,9 @@ import pytest
 from thorough import few
 
 import msgflow
-from msgflow.clocks.clocks_file import read_clock_sync
-from msgflow.clocks.correction import apply_clocks
 from msgflow.db import migration, objects
 from msgflow.db.connection import connect, definitions
+from msgflow.db.runs import change_runs
 from msgflow.errors import DatabaseError
 from msgflow.ingest import ingest
 from msgflow.links.annotations import apply_links
@@ -53,8 +53,8 @@ def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def writers(trace: Path) -> tuple[Callable[[Path], object], ...]:
     """Return all that writes into a database."""
     return (
-        lambda path: apply_links(path, LinksFile(Path("x"), ()), run="all"),
-        lambda path: apply_clocks(path, read_clock_sync("none"), run="all"),
+        lambda path: change_runs(path, "all", partial(apply_links, file=LinksFile(Path("x"), ()))),
+        lambda path: msgflow.open_db(path).apply_clocks("none", run="all"),
         lambda path: ingest([trace], path),
         lambda path: msgflow.open_db(path).rename_run("noon", "evening"),
         lambda path: msgflow.open_db(path).label_runs("noon", robot="r1"),

@@ -16,8 +16,6 @@ import pytest
 from thorough import few
 
 from msgflow import Database, DatabaseError, UsageError
-from msgflow.clocks.clocks_file import read_clock_sync
-from msgflow.clocks.correction import apply_clocks
 from msgflow.database import open_db
 
 SYSTEMS = ("demo", "services", "nested", "partial_sync", "multi_threaded")
@@ -128,7 +126,7 @@ def exported(
     directory = tmp_path_factory.mktemp(request.param)
     path = Path(shutil.copy(simulated(request.param, 0.1), directory / "run.duckdb"))
     if request.param == "demo":
-        apply_clocks(path, read_clock_sync("messages"), run=None)
+        open_db(path).apply_clocks("messages")
     with duckdb.connect(str(path)) as connection:
         connection.execute("UPDATE store.link_transport SET candidate_count = 2 + take_id % 2")
     with open_db(path) as database:

@@ -16,8 +16,6 @@ from browser import ARGUMENTS, find_browser
 from ingested import made_once
 from served import Page, Served
 
-from msgflow.clocks.clocks_file import read_clock_sync
-from msgflow.clocks.correction import apply_clocks
 from msgflow.database import open_db
 from msgflow.db.connection import connect
 from msgflow.ingest import ingest
@@ -31,7 +29,7 @@ def demo(simulated: Callable[..., Path], tmp_path_factory: pytest.TempPathFactor
 
     def make(path: Path) -> None:
         shutil.copyfile(simulated("demo", 0.3), path)
-        apply_clocks(path, read_clock_sync("messages"), run=None)
+        open_db(path).apply_clocks("messages")
 
     return made_once(tmp_path_factory, "demo", make)
 

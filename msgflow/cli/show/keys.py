@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 try:
     import termios
+    import tty
 except ImportError:  # Windows has no such terminals
     termios = None  # type: ignore[assignment]
 
@@ -35,13 +36,11 @@ def noted_keys(pressed: Callable[[str], None]) -> Iterator[None]:
         return
     terminal = sys.stdin.fileno()
     before = termios.tcgetattr(terminal)
-    as_pressed = termios.tcgetattr(terminal)
-    # At once, and not shown.
-    as_pressed[3] &= ~(termios.ICANON | termios.ECHO)
     ended, end = os.pipe()
     thread = Thread(target=_read, args=(terminal, ended, pressed))
     try:
-        termios.tcsetattr(terminal, termios.TCSADRAIN, as_pressed)
+        # At once, and not shown.
+        tty.setcbreak(terminal, termios.TCSADRAIN)
         thread.start()
         yield
     finally:
