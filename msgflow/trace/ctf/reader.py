@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import metadata
 from msgflow.trace.ctf.batches import Iteration
-from msgflow.trace.ctf.declarations import give_order
 from msgflow.trace.ctf.event_positions import BEYOND_END
 from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.ctf.losses import LossCounter
@@ -77,15 +76,11 @@ class CtfTraceSet(TraceSet):
             return TraceInfo(index, path)
         if all(stream_class.clock is None for stream_class in declared.streams.values()):
             for stream_class in declared.streams.values():
-                give_order(stream_class)
+                stream_class.give_order()
         layouts = {}
         for stream_class in declared.streams.values():
             number = sum(len(layout.classes) for layout in self._layouts)
-            try:
-                layout = StreamLayout(index, declared, stream_class, number)
-            except RecursionError as error:
-                raise metadata.damaged_error(path, "too deeply nested") from error
-            layouts[stream_class.id] = layout
+            layout = layouts[stream_class.id] = StreamLayout(index, declared, stream_class, number)
             self._layouts.append(layout)
 
         def report(file: Path, position: int, offset: int, message: str) -> None:
