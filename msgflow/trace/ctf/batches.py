@@ -79,8 +79,8 @@ class Iteration:
         batches = ordered_batches(self._entries, size, self._report_damage, whole)
         with closing(prefetched(batches, _AHEAD)) as ahead:
             for number, batch in enumerate(ahead):
-                if batch.ts_ns.size:
-                    latest_ns = int(batch.ts_ns[-1])
+                if batch.events.ts_ns.size:
+                    latest_ns = int(batch.events.ts_ns[-1])
                 yield from self.events(batch, number)
                 yield from packet_batches(
                     batch.packets, self._batch_rows, number, self._report_damage
@@ -107,8 +107,10 @@ class Iteration:
     def events(self, batch: Batch, number: int) -> Iterator[EventBatch]:
         """Yield the wanted events of a batch, class by class; `number` is that of the round."""
         first_id = self.event_count
-        self.event_count += batch.ts_ns.size
-        classes = batch.classes.astype(np.uint16 if len(self._classes) < 1 << 16 else np.uint32)
+        self.event_count += batch.events.ts_ns.size
+        classes = batch.events.classes.astype(
+            np.uint16 if len(self._classes) < 1 << 16 else np.uint32
+        )
         by_class = np.argsort(classes, kind="stable")
         ends = np.cumsum(np.bincount(classes, minlength=len(self._classes)))
         counts = np.diff(ends, prepend=0)

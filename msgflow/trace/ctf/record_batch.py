@@ -100,20 +100,21 @@ def build_batch(
     far. `reader_at` takes a packet of the batch and the position of an event. It returns what reads
     the packet field by field, and the bit at which the event begins.
     """
-    count, packets = rows.size, batch.in_packet[rows]
+    count, events = rows.size, batch.events
+    packets = events.packets[rows]
     without_cpu = None if batch.has_cpu is None else ~batch.has_cpu[packets]
     arrays = [
         to_arrow(rows + first_id),
-        to_arrow(batch.ts_ns[rows]),
+        to_arrow(events.ts_ns[rows]),
         to_arrow(np.full(count, plan.stream.trace_index, np.int32)),
         to_arrow(batch.cpus[packets], without_cpu),
     ]
     field_of: _GatheredColumns | _FieldByField
     if plan.is_field_by_field:
-        at = map(reader_at, packets.tolist(), batch.positions[rows].tolist())
+        at = map(reader_at, packets.tolist(), events.positions[rows].tolist())
         field_of = _FieldByField([reader.event(bit) for reader, bit in at], names)
     else:
-        field_of = _GatheredColumns(plan, batch.memory, batch.bodies[rows], names)
+        field_of = _GatheredColumns(plan, batch.memory, events.bodies[rows], names)
     for field, source in zip(list(plan.schema)[_LEADING:], plan.sources, strict=True):
         if source is not None:
             arrays.append(field_of.array(source, field.type))
