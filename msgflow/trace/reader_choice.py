@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.trace.archive import is_archive
+from msgflow.trace.archive import is_archive, shown
 from msgflow.trace.discovery import discover
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from msgflow.trace.archived_traces import Unpacked
     from msgflow.trace.ctf.losses import Continuation
     from msgflow.trace.model import TraceLocation
     from msgflow.trace.trace_set import TraceSet
@@ -43,27 +44,31 @@ def open(
     if reader not in READERS:
         raise UsageError(f"there is no reader {reader!r}", hint=f"use one of {', '.join(READERS)}")
     if not any(is_archive(Path(path)) for path in paths):
-        return _open(discover(paths), reader, strict, after)
-    from msgflow.trace.archived_traces import Unpacked, UnpackedTraceSet
+        return _open(discover(paths), None, reader, strict, after)
+    from msgflow.trace.archived_traces import Unpacked
 
     unpacked = Unpacked(paths)
     try:
         with unpacked.explained():
             locations = discover(unpacked.paths)
-            locations.sort(key=lambda location: unpacked.shown(location.path))
-            return UnpackedTraceSet(_open(locations, reader, strict, after), unpacked)
+            locations.sort(key=lambda at: shown(at.path, unpacked.archives) or at.path)
+            return _open(locations, unpacked, reader, strict, after)
     except BaseException:
         unpacked.remove()
         raise
 
 
 def _open(
-    locations: Sequence[TraceLocation], reader: str, strict: bool, after: Continuation | None
+    locations: Sequence[TraceLocation],
+    archives: Unpacked | None,
+    reader: str,
+    strict: bool,
+    after: Continuation | None,
 ) -> TraceSet:
     if reader == "bt2":
         from msgflow.trace.bt2_reader import Bt2TraceSet
 
-        return Bt2TraceSet(locations)
+        return Bt2TraceSet(locations, archives)
     from msgflow.trace.ctf.reader import CtfTraceSet
 
-    return CtfTraceSet(locations, strict=strict, after=after)
+    return CtfTraceSet(locations, archives=archives, strict=strict, after=after)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
+from msgflow.trace import archive
 from msgflow.trace.model import Progress
 
 if TYPE_CHECKING:
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 
     import pyarrow as pa
 
+    from msgflow.trace.archived_traces import Unpacked
     from msgflow.trace.model import Damage, EventBatch, TraceInfo
 
     Wanted = Mapping[str, pa.Schema | None] | None
@@ -35,7 +38,8 @@ class TraceSet(ABC):
 
     traces: tuple[TraceInfo, ...]  # what each trace declares, in order of path
 
-    def __init__(self) -> None:
+    def __init__(self, archives: Unpacked | None = None) -> None:
+        """Take over the unpacked archives with the traces, if any."""
         # (trace index, event name) to the number of events read, wanted or not; only events that
         # occur. Complete after `batches` has ended.
         self.event_counts: Mapping[tuple[int, str], int] = {}
@@ -48,7 +52,8 @@ class TraceSet(ABC):
         # ended.
         self.damages: list[Damage] = []
         # Directories with what archives had, until the set is closed, and the archive of each.
-        self.unpacked: Mapping[Path, Path] = {}
+        self.unpacked: Mapping[Path, Path] = {} if archives is None else archives.archives
+        self._archives = archives
         # Weak, so that an iteration which its consumer has dropped is over.
         self._running: weakref.ref[Batches] | None = None
         self._closed = False
@@ -82,23 +87,40 @@ class TraceSet(ABC):
             raise UsageError(
                 "these traces are being read already", hint="open them a second time to read twice"
             )
-        iteration = self._batches(wanted, progress, batch_rows)
+        iteration = self._explained(wanted, progress, batch_rows)
         self._running = weakref.ref(iteration)
         return iteration
 
     def close(self) -> None:
-        """End an iteration under way, and give everything back. May be called more than once."""
+        """End an iteration under way, and give everything back; may be called more than once."""
         self._closed = True
         iteration = self._under_way()
         if iteration is not None:
             iteration.close()
         self._running = None
+        if self._archives is not None:
+            self._archives.remove()
 
     def __enter__(self) -> TraceSet:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def shown(self, path: Path) -> Path:
+        """Return a path as the user knows it: within an archive, that of the archive first."""
+        return archive.shown(path, self.unpacked) or path
+
+    def _explained(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
+        """Read everything; errors name what the user knows."""
+        explained = (
+            contextlib.nullcontext() if self._archives is None else self._archives.explained()
+        )
+        try:
+            with explained:
+                yield from self._batches(wanted, progress, batch_rows)
+        finally:
+            self._running = None
 
     @abstractmethod
     def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
