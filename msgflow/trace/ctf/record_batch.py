@@ -59,18 +59,11 @@ class ClassPlan:
         body = self.layout.body
         if self.stream.header is None or body.fields is None:
             return True
-        paths = [
-            path
-            for source in self.sources
-            if source is not None and source.number is None
-            for path in source.paths
-        ]
+        others = [source for source in self.sources if source is not None and source.number is None]
         return not all(
-            body.variant is not None
-            and path[0] == body.variant_name
-            and len(path) > 1
-            and body.variant.has(path[1:])
-            for path in paths
+            body.variant is not None and body.variant.has(path)
+            for source in others
+            for path in source.paths
         )
 
 
