@@ -78,8 +78,8 @@ class Iteration:
         batches = ordered_batches(self._entries, size, self._report_damage, whole)
         with closing(prefetched(batches, _AHEAD)) as ahead:
             for number, batch in enumerate(ahead):
-                if batch.events.ts_ns.size:
-                    latest_ns = int(batch.events.ts_ns[-1])
+                if batch.rows.size:
+                    latest_ns = int(batch.events.ts_ns[batch.rows[-1]])
                 yield from self.events(batch, number)
                 yield from packet_batches(
                     batch.packets, self._batch_rows, number, self._report_damage
@@ -106,10 +106,9 @@ class Iteration:
     def events(self, batch: Batch, number: int) -> Iterator[EventBatch]:
         """Yield the wanted events of a batch, class by class; `number` is that of the round."""
         first_id = self.event_count
-        self.event_count += batch.events.ts_ns.size
-        classes = batch.events.classes.astype(
-            np.uint16 if len(self._classes) < 1 << 16 else np.uint32
-        )
+        self.event_count += batch.rows.size
+        classes = batch.events.classes[batch.rows]
+        classes = classes.astype(np.uint16 if len(self._classes) < 1 << 16 else np.uint32)
         by_class = np.argsort(classes, kind="stable")
         ends = np.cumsum(np.bincount(classes, minlength=len(self._classes)))
         counts = np.diff(ends, prepend=0)

@@ -43,7 +43,8 @@ class Batch:
     entries: list[Entry]  # the packets in memory, in the order of their rows
     bases: list[int]  # where they lie in memory; `Entry.base` may already belong to a later batch
     packets: list[PacketEvents]  # summaries of the packets that were in no batch before
-    events: Events
+    events: Events  # those in these packets
+    rows: NDArray[np.int64]  # which of them are of the batch, in order
     cpus: NDArray[np.int32]  # the CPU of each packet
     has_cpu: NDArray[np.bool_] | None  # which packets have one; None if all have
 
@@ -131,7 +132,7 @@ def _load(
         parts.append(events_of(layout, loader.memory, of_layout, report, report_once, first=number))
         number += len(of_layout)
     events = joined(parts)
-    counts = np.bincount(events.packets, minlength=len(entries))
+    counts = np.diff(np.searchsorted(events.packets, np.arange(len(entries) + 1)))
     is_new = np.array([id(entry) not in is_held for entry in entries])
     rank_ns = _ranks(entries, counts, events.ts_ns)
     return _Loaded(loader.memory, entries, is_new, events, counts, rank_ns)
@@ -175,13 +176,13 @@ def _parts(
     bases = [entry.base for entry in loaded.entries]
     cpus = [entry.packet.header.cpu for entry in loaded.entries]
     for begin in range(0, max(order.size, 1), MOST_EVENTS):
-        rows = order[begin : begin + MOST_EVENTS]
         yield Batch(
             memory=loaded.memory,
             entries=loaded.entries,
             bases=bases,
             packets=packets,
-            events=loaded.events.take(rows),
+            events=loaded.events,
+            rows=order[begin : begin + MOST_EVENTS],
             cpus=np.array([cpu or 0 for cpu in cpus], np.uint64).astype(np.int32),
             has_cpu=np.array([cpu is not None for cpu in cpus]) if None in cpus else None,
         )

@@ -122,13 +122,14 @@ def _without_absurd(
     if not events.packets.size:
         return events
     limits = np.array([_limits(entry, layout.clock) for entry in entries], np.uint64)
-    packets = events.packets - first
-    begins = np.flatnonzero(np.diff(packets, prepend=-1))
-    earliest, latest = limits[packets[begins]].T
+    counts = np.array([_begins(entry).size for entry in entries])
+    begins = (np.cumsum(counts) - counts)[counts > 0]
+    earliest, latest = limits[counts > 0].T
     is_early = np.minimum.reduceat(events.clock, begins) < earliest
     is_late = np.maximum.reduceat(events.clock, begins) > latest
     if not (is_early | is_late).any():
         return events
+    packets = events.packets - first
     good = (events.clock >= limits[packets, 0]) & (events.clock <= limits[packets, 1])
     for place in distinct(packets[~good]).tolist():
         entry = entries[place]

@@ -92,20 +92,20 @@ def build_batch(
     and the position of an event. It returns what reads the packet field by field, and the bit at
     which the event begins.
     """
-    count, events = rows.size, batch.events
-    packets = events.packets[rows]
+    count, events, at = rows.size, batch.events, batch.rows[rows]
+    packets = events.packets[at]
     without_cpu = None if batch.has_cpu is None else ~batch.has_cpu[packets]
     arrays = [
         to_arrow(rows + first_id),
-        to_arrow(events.ts_ns[rows]),
+        to_arrow(events.ts_ns[at]),
         to_arrow(np.full(count, plan.stream.trace_index, np.int32)),
         to_arrow(batch.cpus[packets], without_cpu),
     ]
     if plan.is_field_by_field:
-        at = map(reader_at, packets.tolist(), events.positions[rows].tolist())
-        array = _field_by_field([reader.event(bit) for reader, bit in at])
+        places = map(reader_at, packets.tolist(), events.positions[at].tolist())
+        array = _field_by_field([reader.event(bit) for reader, bit in places])
     else:
-        array = _gathered(plan, batch.memory, events.bodies[rows])
+        array = _gathered(plan, batch.memory, events.bodies[at])
     for field, source in zip(list(plan.schema)[_LEADING:], plan.sources, strict=True):
         if source is not None:
             arrays.append(array(source, field.type))
