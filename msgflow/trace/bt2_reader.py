@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
+    from msgflow.trace.archived_traces import Unpacked
     from msgflow.trace.model import TraceLocation
     from msgflow.trace.trace_set import Batches, Wanted
 
@@ -40,22 +41,26 @@ _ADDRESS = re.compile(r"[\w-]*addr=0x[0-9a-f]+,?")
 class Bt2TraceSet(TraceSet):
     """Traces read through Babeltrace 2."""
 
-    def __init__(self, locations: Sequence[TraceLocation]) -> None:
+    def __init__(
+        self, locations: Sequence[TraceLocation], archives: Unpacked | None = None
+    ) -> None:
         """Describe the traces; raises TraceError where bt2 is missing or cannot open one."""
-        super().__init__()
+        super().__init__(archives)
         self._bt2 = bt2_library.load()
         described = [describe(self._bt2, at.path, index) for index, at in enumerate(locations)]
-        self.traces = on_one_base([info for info, _ in described], {})
+        self._located = on_one_base([info for info, _ in described], {})
+        self.traces = tuple(replace(info, path=self.shown(info.path)) for info in self._located)
         self._declared = columns.merged_schemas(e for _, events in described for e in events)
 
     def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
-        reading = _Reading(self._bt2, self.traces, columns.complete_schemas(wanted, self._declared))
+        reading = _Reading(
+            self._bt2, self._located, columns.complete_schemas(wanted, self._declared)
+        )
         try:
             yield from reading.batches(progress, batch_rows)
         finally:
             self.event_counts = dict(sorted(reading.counts.items()))
             self.duplicate_packet_count = reading.duplicates
-            self._running = None
 
 
 @dataclass

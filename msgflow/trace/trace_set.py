@@ -1,26 +1,32 @@
-"""Sets of traces: what every reader of them does, one iteration at a time."""
+"""Sets of traces: opened by a reader of choice, and what every reader of them does."""
 
 from __future__ import annotations
 
+import contextlib
 import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
+from msgflow.trace.archive import is_archive, shown
+from msgflow.trace.discovery import discover
 from msgflow.trace.model import Progress
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator, Mapping
-    from pathlib import Path
+    from collections.abc import Generator, Iterator, Mapping, Sequence
 
     import pyarrow as pa
 
-    from msgflow.trace.model import Damage, EventBatch, TraceInfo
+    from msgflow.trace.archived_traces import Unpacked
+    from msgflow.trace.ctf.losses import Continuation
+    from msgflow.trace.model import Damage, EventBatch, TraceInfo, TraceLocation
 
     Wanted = Mapping[str, pa.Schema | None] | None
     Batches = Generator[EventBatch, None, None]
 
+READERS = ("auto", "msgflow", "bt2")
 DEFAULT_BATCH_ROWS = 65_536
 
 Report = Callable[[Progress], None]
@@ -35,7 +41,8 @@ class TraceSet(ABC):
 
     traces: tuple[TraceInfo, ...]  # what each trace declares, in order of path
 
-    def __init__(self) -> None:
+    def __init__(self, archives: Unpacked | None = None) -> None:
+        """Take over the unpacked archives with the traces, if any."""
         # (trace index, event name) to the number of events read, wanted or not; only events that
         # occur. Complete after `batches` has ended.
         self.event_counts: Mapping[tuple[int, str], int] = {}
@@ -48,7 +55,8 @@ class TraceSet(ABC):
         # ended.
         self.damages: list[Damage] = []
         # Directories with what archives had, until the set is closed, and the archive of each.
-        self.unpacked: Mapping[Path, Path] = {}
+        self.unpacked: Mapping[Path, Path] = {} if archives is None else archives.archives
+        self._archives = archives
         # Weak, so that an iteration which its consumer has dropped is over.
         self._running: weakref.ref[Batches] | None = None
         self._closed = False
@@ -82,17 +90,19 @@ class TraceSet(ABC):
             raise UsageError(
                 "these traces are being read already", hint="open them a second time to read twice"
             )
-        iteration = self._batches(wanted, progress, batch_rows)
+        iteration = self._explained(wanted, progress, batch_rows)
         self._running = weakref.ref(iteration)
         return iteration
 
     def close(self) -> None:
-        """End an iteration under way, and give everything back. May be called more than once."""
+        """End an iteration under way, and give everything back; may be called more than once."""
         self._closed = True
         iteration = self._under_way()
         if iteration is not None:
             iteration.close()
         self._running = None
+        if self._archives is not None:
+            self._archives.remove()
 
     def __enter__(self) -> TraceSet:
         return self
@@ -100,9 +110,78 @@ class TraceSet(ABC):
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def shown(self, path: Path) -> Path:
+        """Return a path as the user knows it: within an archive, that of the archive first."""
+        return shown(path, self.unpacked) or path
+
+    def _explained(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
+        """Read everything; errors name what the user knows."""
+        explained = (
+            contextlib.nullcontext() if self._archives is None else self._archives.explained()
+        )
+        try:
+            with explained:
+                yield from self._batches(wanted, progress, batch_rows)
+        finally:
+            self._running = None
+
     @abstractmethod
     def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
         """Read everything; sets `event_counts` and `duplicate_packet_count` at its end."""
 
     def _under_way(self) -> Batches | None:
         return None if self._running is None else self._running()
+
+
+def open(
+    paths: Sequence[str | Path],
+    *,
+    reader: str = "auto",
+    strict: bool = False,
+    after: Continuation | None = None,
+) -> TraceSet:
+    """Open all traces below `paths` as one set.
+
+    Paths are CTF directories, directories above such, or archives of such (.tar, also with .gz, .xz
+    or .zst, and .zip). Archives are unpacked to the temporary directory (TMPDIR) until the set is
+    closed. The reader is 'msgflow' (its own decoder), 'bt2' (Babeltrace 2's Python bindings, which
+    end at the first damage), or 'auto', which is 'msgflow'. `strict` ends at the first damage.
+    `after` has the parts of the same recordings that were read before; it takes in these, which can
+    be read only once then. Only msgflow's own decoder can go on like this.
+
+    Raises:
+        TraceError: there is no readable trace below a path, an archive cannot be unpacked, or
+            the reader is not installed.
+        UsageError: there is no reader of that name.
+    """
+    if reader not in READERS:
+        raise UsageError(f"there is no reader {reader!r}", hint=f"use one of {', '.join(READERS)}")
+    if not any(is_archive(Path(path)) for path in paths):
+        return _open(discover(paths), None, reader, strict, after)
+    from msgflow.trace.archived_traces import Unpacked
+
+    unpacked = Unpacked(paths)
+    try:
+        with unpacked.explained():
+            locations = discover(unpacked.paths)
+            locations.sort(key=lambda at: shown(at.path, unpacked.archives) or at.path)
+            return _open(locations, unpacked, reader, strict, after)
+    except BaseException:
+        unpacked.remove()
+        raise
+
+
+def _open(
+    locations: Sequence[TraceLocation],
+    archives: Unpacked | None,
+    reader: str,
+    strict: bool,
+    after: Continuation | None,
+) -> TraceSet:
+    if reader == "bt2":
+        from msgflow.trace.bt2_reader import Bt2TraceSet
+
+        return Bt2TraceSet(locations, archives)
+    from msgflow.trace.ctf.reader import CtfTraceSet
+
+    return CtfTraceSet(locations, archives=archives, strict=strict, after=after)

@@ -14,7 +14,7 @@ from msgflow.trace.ctf.arrow import declared_schema
 from msgflow.trace.ctf.event_order import ordered_batches
 from msgflow.trace.ctf.events import event_reader_of
 from msgflow.trace.ctf.field_types import BYTE
-from msgflow.trace.ctf.record_batch import ClassPlan, ThreadNames, build_batch, make_plan
+from msgflow.trace.ctf.record_batch import ClassPlan, build_batch, make_plan
 from msgflow.trace.model import PACKET, EventBatch, Progress
 from msgflow.trace.numpy_arrow import integers_to_arrow
 from msgflow.trace.prefetch import prefetched
@@ -52,7 +52,6 @@ class Iteration:
         self._report_damage = report
         self._classes = [(layout, known) for layout in layouts for known in layout.classes.values()]
         self._counts = np.zeros(len(self._classes), np.int64)
-        self._names = ThreadNames()
         declared = merged_schemas(
             (known.event.name, declared_schema(known.event.payload)) for _, known in self._classes
         )
@@ -79,8 +78,8 @@ class Iteration:
         batches = ordered_batches(self._entries, size, self._report_damage, whole)
         with closing(prefetched(batches, _AHEAD)) as ahead:
             for number, batch in enumerate(ahead):
-                if batch.ts_ns.size:
-                    latest_ns = int(batch.ts_ns[-1])
+                if batch.rows.size:
+                    latest_ns = int(batch.events.ts_ns[batch.rows[-1]])
                 yield from self.events(batch, number)
                 yield from packet_batches(
                     batch.packets, self._batch_rows, number, self._report_damage
@@ -107,8 +106,9 @@ class Iteration:
     def events(self, batch: Batch, number: int) -> Iterator[EventBatch]:
         """Yield the wanted events of a batch, class by class; `number` is that of the round."""
         first_id = self.event_count
-        self.event_count += batch.ts_ns.size
-        classes = batch.classes.astype(np.uint16 if len(self._classes) < 1 << 16 else np.uint32)
+        self.event_count += batch.rows.size
+        classes = batch.events.classes[batch.rows]
+        classes = classes.astype(np.uint16 if len(self._classes) < 1 << 16 else np.uint32)
         by_class = np.argsort(classes, kind="stable")
         ends = np.cumsum(np.bincount(classes, minlength=len(self._classes)))
         counts = np.diff(ends, prepend=0)
@@ -129,7 +129,7 @@ class Iteration:
                 place = plan.layout.number
                 if counts[place]:
                     rows = by_class[ends[place] - counts[place] : ends[place]]
-                    parts.append(build_batch(plan, batch, rows, first_id, self._names, reader_at))
+                    parts.append(build_batch(plan, batch, rows, first_id, reader_at))
             if parts:
                 whole = parts[0] if len(parts) == 1 else _in_order(parts)
                 for begin in range(0, whole.num_rows, self._batch_rows):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.clock import Clock
-from msgflow.trace.ctf.field_types import MetadataError, Role
+from msgflow.trace.ctf.field_types import MetadataError
 
 _SMALLEST_ID, _LARGEST_ID = -(1 << 63), (1 << 64) - 1
-_TIMES = {Role.TIME, Role.END}
 
 
 @dataclass(eq=False)
@@ -34,6 +33,10 @@ class StreamClass:
     events: dict[int, EventClass] = field(default_factory=dict)
     has_time: bool = True  # its events have times; if not, `clock` only counts packets
 
+    def give_order(self) -> None:
+        """Prepare for packets that are ordered by numbers in place of times."""
+        self.clock, self.has_time = Clock(), False
+
 
 @dataclass(eq=False)
 class TraceClass:
@@ -54,28 +57,3 @@ class TraceClass:
         if event.id in stream.events:
             raise MetadataError(f"there are two events {event.id} in stream {stream.id}")
         stream.events[event.id] = event
-
-
-def give_order(stream: StreamClass) -> None:
-    """Prepare a stream class for packets that are ordered by numbers in place of times."""
-    stream.clock, stream.has_time = Clock(), False
-    stream.packet_context = _structure(stream.packet_context)
-    stream.event_header = _structure(stream.event_header)
-
-
-def _structure(declared: ctf.Structure) -> ctf.Structure:
-    members = tuple(ctf.Member(member.name, _type(member.type)) for member in declared.members)
-    return ctf.Structure(members, declared.minimum_align)
-
-
-def _type(declared: ctf.Type) -> ctf.Type:
-    match declared:
-        case ctf.Structure():
-            return _structure(declared)
-        case ctf.Variant():
-            choices = (ctf.Choice(c.name, _type(c.type), c.ranges) for c in declared.choices)
-            return replace(declared, choices=tuple(choices))
-        case ctf.Integer() | ctf.VariableInteger() | ctf.Array():
-            return replace(declared, roles=declared.roles - _TIMES)
-        case _:
-            return declared

@@ -14,9 +14,8 @@ from msgflow.trace.ctf.layout import (
     VariantLayout,
     dtype_of,
     is_dense,
-    is_selector,
     lay_out,
-    lay_out_variant,
+    without_variant,
 )
 
 if TYPE_CHECKING:
@@ -71,7 +70,6 @@ class EventBody:
     # Of each field in bytes, by residue; None if `sizes` is None.
     offsets: tuple[tuple[int, ...], ...] | None
     variant: VariantLayout | None = None  # the variant behind the fields; None without one
-    variant_name: str = ""  # its name in the payload
     selector: int = -1  # place in the list of the field that chooses its option
 
     @cached_property
@@ -137,37 +135,22 @@ def compile_body(stream: StreamClass, event: EventClass, residues: int) -> Event
         Scope.PAYLOAD: event.payload,
     }
     sizes = _sizes(list(structures.values()), residues)
-    last = event.payload.members[-1] if event.payload.members else None
-    variant = last.type if last is not None and isinstance(last.type, ctf.Variant) else None
+    fields: list[PlainField] = []
+    try:
+        payload, variant = without_variant(event.payload, {None, Scope.PAYLOAD})
+        for scope, structure in (structures | {Scope.PAYLOAD: payload}).items():
+            _add_fields(fields, scope, structure)
+    except DynamicError:
+        return EventBody(None, sizes, None)
     if variant is not None:
-        before = ctf.Structure(event.payload.members[:-1], event.payload.align)
-        structures[Scope.PAYLOAD] = before
-    fields: list[PlainField] | None = []
-    for scope, structure in structures.items():
-        if fields is not None:
-            fields = _add_fields(fields, scope, structure)
-    if fields is not None and variant is not None and last is not None:
-        return _with_variant(fields, variant, last.name)
+        names = [field.name if field.scope is Scope.PAYLOAD else None for field in fields]
+        selector = len(names) - 1 - names[::-1].index(variant.selector)
+        fields[selector] = replace(fields[selector], is_length=True)
+        return EventBody(tuple(fields), None, None, variant, selector)
     offsets = None
-    if fields is not None and sizes is not None:
+    if sizes is not None:
         offsets = tuple(zip(*(_offsets(fields, r) for r in range(residues)), strict=True))
-    return EventBody(None if fields is None else tuple(fields), sizes, offsets)
-
-
-def _with_variant(fields: list[PlainField], variant: ctf.Variant, name: str) -> EventBody:
-    reference, layout = variant.selector, lay_out_variant(variant)
-    for number, field in enumerate(fields):
-        if (
-            layout is not None
-            and reference.path == (field.name,)
-            and field.scope is Scope.PAYLOAD
-            and reference.scope in {None, Scope.PAYLOAD}
-            and field.type is not None
-            and is_selector(field.type)
-        ):
-            fields[number] = replace(field, is_length=True)
-            return EventBody(tuple(fields), None, None, layout, name, number)
-    return EventBody(None, None, None)
+    return EventBody(tuple(fields), sizes, offsets)
 
 
 def _sizes(structures: list[ctf.Structure], residues: int) -> tuple[int, ...] | None:
@@ -194,27 +177,20 @@ def _offsets(fields: list[PlainField], residue: int) -> list[int]:
     return offsets
 
 
-def _add_fields(
-    fields: list[PlainField], scope: Scope, structure: ctf.Structure
-) -> list[PlainField] | None:
-    fields = list(fields)
+def _add_fields(fields: list[PlainField], scope: Scope, structure: ctf.Structure) -> None:
+    """Add the members of a structure; a DynamicError says that one is no plain field."""
     if structure.align > 1:
         if structure.align % BYTE:
-            return None
+            raise DynamicError
         fields.append(PlainField(scope, "", Kind.NOTHING, structure.align // BYTE))
     for member in structure.members:
         field = _plain(fields, scope, member.name, member.type)
-        if field is None:
-            return None
         if field.length_at >= 0:
             fields[field.length_at] = replace(fields[field.length_at], is_length=True)
         fields.append(field)
-    return fields
 
 
-def _plain(
-    fields: list[PlainField], scope: Scope, name: str, declared: ctf.Type
-) -> PlainField | None:
+def _plain(fields: list[PlainField], scope: Scope, name: str, declared: ctf.Type) -> PlainField:
     # Every plain field ends on a whole byte: a smaller alignment changes nothing behind it.
     align = max(declared.align // BYTE, 1)
     kind, count, length_at, element = Kind.NUMBER, 1, -1, declared
@@ -226,27 +202,23 @@ def _plain(
             count, element = declared.length, declared.element
         case ctf.Sequence():
             kind = Kind.TEXT_SEQUENCE if declared.is_text else Kind.SEQUENCE
-            found, element = _length_field(fields, scope, declared), declared.element
-            if found is None:
-                return None
-            length_at = found
+            length_at, element = _length_field(fields, scope, declared), declared.element
     if not isinstance(element, ctf.Integer | ctf.Real) or element.size not in _WIDTHS:
-        return None
+        raise DynamicError
     if element is not declared and not is_dense(element):
-        return None
+        raise DynamicError
     dtype, width = dtype_of(element), element.size // BYTE
     return PlainField(scope, name, kind, align, dtype, width, count, length_at, type=declared)
 
 
-def _length_field(fields: list[PlainField], scope: Scope, declared: ctf.Sequence) -> int | None:
-    """Return the place of the field with the length, None if no plain field before has it."""
+def _length_field(fields: list[PlainField], scope: Scope, declared: ctf.Sequence) -> int:
+    """Return the place of the field with the length, which must be a plain one before."""
     reference = declared.length
-    if len(reference.path) != 1:
-        return None
-    scopes = [scope] if reference.scope is None else [reference.scope]
+    wanted = scope if reference.scope is None else reference.scope
     for number in range(len(fields) - 1, -1, -1):
         field = fields[number]
-        if field.name == reference.path[0] and field.scope in scopes:
-            is_unsigned = isinstance(field.type, ctf.Integer) and not field.type.signed
-            return number if field.kind is Kind.NUMBER and is_unsigned else None
-    return None
+        if (field.name,) == reference.path and field.scope is wanted:
+            if isinstance(field.type, ctf.Integer) and not field.type.signed:
+                return number
+            break
+    raise DynamicError

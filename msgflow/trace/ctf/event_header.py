@@ -16,6 +16,8 @@ from msgflow.trace.ctf.layout import DynamicError, Leaf, lay_out
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from msgflow.trace.ctf.declarations import StreamClass
+
 
 @dataclass(frozen=True)
 class Place:
@@ -76,11 +78,12 @@ class EventHeader:
         return max(size for form in self.forms for size in form.sizes)
 
 
-def compile_header(structure: ctf.Structure, residues: int) -> EventHeader | None:
+def compile_header(stream: StreamClass, residues: int) -> EventHeader | None:
     """Compile the layout of headers; None if they must be read field by field.
 
     `residues` is as for `compile_body`.
     """
+    structure = stream.event_header
     if structure.align % BYTE or not structure.members:
         return None
     last = structure.members[-1].type
@@ -88,7 +91,7 @@ def compile_header(structure: ctf.Structure, residues: int) -> EventHeader | Non
     if isinstance(last, ctf.Variant):
         choices = last.choices
     try:
-        forms = [_form(structure, choice, residues) for choice in choices]
+        forms = [_form(stream, choice, residues) for choice in choices]
         selector = forms[0].id
         if isinstance(last, ctf.Variant):
             path = last.selector.path
@@ -120,8 +123,8 @@ def _leaves(
     return leaves, position
 
 
-def _form(structure: ctf.Structure, choice: ctf.Choice | None, residues: int) -> Form:
-    laid_out = [_leaves(structure, choice, residue) for residue in range(residues)]
+def _form(stream: StreamClass, choice: ctf.Choice | None, residues: int) -> Form:
+    laid_out = [_leaves(stream.event_header, choice, residue) for residue in range(residues)]
     sizes = []
     for residue, (_, end) in enumerate(laid_out):
         if end % BYTE:
@@ -130,7 +133,9 @@ def _form(structure: ctf.Structure, choice: ctf.Choice | None, residues: int) ->
     return Form(
         choice,
         _place([_last_of_role(found, Role.EVENT_CLASS) for found in laid_out]),
-        _place([_last_of_role(found, Role.TIME) for found in laid_out]),
+        _place([_last_of_role(found, Role.TIME) for found in laid_out])
+        if stream.has_time
+        else None,
         tuple(sizes),
     )
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 import heapq
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from msgflow.trace.ctf.events import Events, find_events, read_events, say_nothing, without_absurd
+from msgflow.trace.ctf.events import Events, events_of, joined, say_nothing
 from msgflow.trace.ctf.packet_memory import Loader
 from msgflow.trace.ctf.packet_order import PacketEvents
 from msgflow.trace.ctf.stream_layout import GAP
@@ -43,32 +43,24 @@ class Batch:
     entries: list[Entry]  # the packets in memory, in the order of their rows
     bases: list[int]  # where they lie in memory; `Entry.base` may already belong to a later batch
     packets: list[PacketEvents]  # summaries of the packets that were in no batch before
-    in_packet: NDArray[np.int32]  # which of `entries` each event is in
-    classes: NDArray[np.uint32]  # numbers of the event classes
-    ts_ns: NDArray[np.int64]
-    bodies: NDArray[np.int64]  # where contexts and payload begin
-    positions: NDArray[np.int64]  # where headers begin
+    events: Events  # those in these packets
+    rows: NDArray[np.int64]  # which of them are of the batch, in order
     cpus: NDArray[np.int32]  # the CPU of each packet
     has_cpu: NDArray[np.bool_] | None  # which packets have one; None if all have
 
 
 @dataclass(frozen=True)
 class _Loaded:
-    """All that is in memory; what has no comment is as in `Batch`, a row per event."""
+    """All that is in memory."""
 
     memory: Memory
     entries: list[Entry]
-    new: list[bool]  # which of the packets were not there before
-    counts: NDArray[np.int64]  # rows of each packet
-    in_packet: NDArray[np.int32]
-    classes: NDArray[np.uint32]
-    clock: NDArray[np.uint64]  # values of the clock
-    ts_ns: NDArray[np.int64]
+    is_new: NDArray[np.bool_]  # which of the packets were not there before
+    events: Events
+    counts: NDArray[np.int64]  # events of each packet
     # Times to order the events by: none is before `Entry.order_ns`, where batches are cut. The
     # order would differ with their size.
     rank_ns: NDArray[np.int64]
-    bodies: NDArray[np.int64]
-    positions: NDArray[np.int64]
 
 
 def ordered_batches(
@@ -133,35 +125,17 @@ def _load(
     for entry in loader.load(entries):
         report(entry, 0, "the file has become shorter, the packet is gone")
         entry.events = np.empty(0, np.int64)
-    memory = loader.memory
     parts: list[Events] = []
-    times = []
+    number = 0
     for layout, group in groupby(entries, key=lambda entry: entry.stream.layout):
         of_layout = list(group)
-        find_events(layout, memory, [e for e in of_layout if e.events is None], report)
-        events = read_events(layout, memory, of_layout)
-        events = without_absurd(layout, of_layout, events, report_once)
-        parts.append(events)
-        times.append(layout.clock.to_ns_array(events.clock))
-    counts = np.concatenate([part.counts for part in parts])
-    ts_ns = _joined(times)
-    return _Loaded(
-        memory=memory,
-        entries=entries,
-        new=[id(entry) not in is_held for entry in entries],
-        counts=counts,
-        in_packet=np.repeat(np.arange(counts.size, dtype=np.int32), counts),
-        classes=_joined([part.classes for part in parts]),
-        clock=_joined([part.clock for part in parts]),
-        ts_ns=ts_ns,
-        rank_ns=_ranks(entries, counts, ts_ns),
-        bodies=_joined([part.bodies for part in parts]),
-        positions=_joined([part.positions for part in parts]),
-    )
-
-
-def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+        parts.append(events_of(layout, loader.memory, of_layout, report, report_once, first=number))
+        number += len(of_layout)
+    events = joined(parts)
+    counts = np.diff(np.searchsorted(events.packets, np.arange(len(entries) + 1)))
+    is_new = np.array([id(entry) not in is_held for entry in entries])
+    rank_ns = _ranks(entries, counts, events.ts_ns)
+    return _Loaded(loader.memory, entries, is_new, events, counts, rank_ns)
 
 
 def _ranks(
@@ -184,7 +158,7 @@ def _order(loaded: _Loaded, are_cut: bool, since_ns: int, until_ns: int) -> NDAr
     rank_ns = loaded.rank_ns
     rows: NDArray[np.int64] | None = None
     if not are_cut:
-        waits = np.repeat(np.array(loaded.new), loaded.counts) | (rank_ns >= since_ns)
+        waits = loaded.is_new[loaded.events.packets] | (rank_ns >= since_ns)
         rows = np.flatnonzero(waits)
     # Stable: at the same time, rows stay in the order of streams and of places in a stream.
     order = np.argsort(rank_ns if rows is None else rank_ns[rows], kind="stable")
@@ -202,17 +176,13 @@ def _parts(
     bases = [entry.base for entry in loaded.entries]
     cpus = [entry.packet.header.cpu for entry in loaded.entries]
     for begin in range(0, max(order.size, 1), MOST_EVENTS):
-        rows = order[begin : begin + MOST_EVENTS]
         yield Batch(
             memory=loaded.memory,
             entries=loaded.entries,
             bases=bases,
             packets=packets,
-            in_packet=loaded.in_packet[rows],
-            classes=loaded.classes[rows],
-            ts_ns=loaded.ts_ns[rows],
-            bodies=loaded.bodies[rows],
-            positions=loaded.positions[rows],
+            events=loaded.events,
+            rows=order[begin : begin + MOST_EVENTS],
             cpus=np.array([cpu or 0 for cpu in cpus], np.uint64).astype(np.int32),
             has_cpu=np.array([cpu is not None for cpu in cpus]) if None in cpus else None,
         )
@@ -221,13 +191,12 @@ def _parts(
 
 def _packets(loaded: _Loaded) -> Iterator[PacketEvents]:
     """Yield summaries of the new packets; `cut` makes those of packets in pieces."""
-    ts_ns, clock = loaded.ts_ns, loaded.clock
+    ts_ns, clock, owners = loaded.events.ts_ns, loaded.events.clock, loaded.events.packets
     falls = np.flatnonzero(ts_ns[1:] < ts_ns[:-1]) + 1
-    owners = loaded.in_packet[falls]
-    backward = set(owners[owners == loaded.in_packet[falls - 1]].tolist())
+    backward = set(owners[falls][owners[falls] == owners[falls - 1]].tolist())
     ends = np.cumsum(loaded.counts).tolist()
     counts = loaded.counts.tolist()
-    for place, (entry, new) in enumerate(zip(loaded.entries, loaded.new, strict=True)):
+    for place, (entry, new) in enumerate(zip(loaded.entries, loaded.is_new.tolist(), strict=True)):
         if not new or entry.until is not None:
             continue
         count, end = counts[place], ends[place]
@@ -250,7 +219,7 @@ def _unfinished(loaded: _Loaded, until_ns: int) -> tuple[list[Entry], bool]:
         return [], True
     late = np.flatnonzero(loaded.rank_ns >= until_ns)
     packets, first, counts = np.unique(
-        loaded.in_packet[late], return_index=True, return_counts=True
+        loaded.events.packets[late], return_index=True, return_counts=True
     )
     ends = np.cumsum(loaded.counts)[packets]
     begins = ends - loaded.counts[packets]
@@ -269,7 +238,7 @@ def _unfinished(loaded: _Loaded, until_ns: int) -> tuple[list[Entry], bool]:
         if count == end - at and entry.events.size == end - begin:
             if at > begin:
                 entry.events = entry.events[at - begin :]
-                entry.clock_before = int(loaded.clock[at - 1])
+                entry.clock_before = int(loaded.events.clock[at - 1])
         else:
             are_cut = False
     return held, are_cut
@@ -298,13 +267,12 @@ def cut(
         return None
     layout = entry.stream.layout
     entry.base = 0
-    find_events(layout, memory, [entry], report)
-    events = read_events(layout, memory, [entry])
-    is_sound = without_absurd(layout, [entry], events, say_nothing) is events
+    events = events_of(layout, memory, [entry], report, say_nothing)
     entry.base = -1
-    ts_ns = layout.clock.to_ns_array(events.clock)
-    begins = events.positions
-    if not (is_sound and begins.size and (ts_ns[1:] >= ts_ns[:-1]).all()):
+    ts_ns, begins = events.ts_ns, events.positions
+    assert entry.events is not None
+    is_sound = 0 < begins.size == entry.events.size and (ts_ns[1:] >= ts_ns[:-1]).all()
+    if not is_sound:
         return None
     entry.events = None
     first = distinct(np.searchsorted(begins, np.arange(0, begins[-1] + 1, PIECE)))

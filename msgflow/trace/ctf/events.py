@@ -29,27 +29,54 @@ _SLACK_SECONDS = 86_400
 
 @dataclass(frozen=True)
 class Events:
-    """Events of some packets, packet after packet."""
+    """Events of some packets, packet after packet, or any of them; a row each."""
 
-    counts: NDArray[np.int64]  # how many each packet has
+    packets: NDArray[np.int32]  # which packet each is in
     classes: NDArray[np.uint32]  # numbers of their classes
     clock: NDArray[np.uint64]  # values of the clock
+    ts_ns: NDArray[np.int64]
     bodies: NDArray[np.int64]  # where contexts and payload begin: bytes of memory
     # Where headers begin: bytes of memory, or bits of the packet in streams whose headers are read
     # field by field.
     positions: NDArray[np.int64]
 
+    def take(self, rows: NDArray[Any]) -> Events:
+        """Return these rows, or those that are true."""
+        return Events(*(column[rows] for column in vars(self).values()))
 
-def find_events(
+
+def joined(parts: list[Events]) -> Events:
+    """Return the events of all parts, one part after the other."""
+    if len(parts) == 1:
+        return parts[0]
+    return Events(*map(np.concatenate, zip(*(vars(part).values() for part in parts), strict=True)))
+
+
+def events_of(
+    layout: StreamLayout,
+    memory: Memory,
+    entries: Sequence[Entry],
+    report: Callable[[Entry, int, str], None],
+    report_absurd: Callable[[Entry, int, str], None],
+    first: int = 0,
+) -> Events:
+    """Find the events of packets of one stream class, which lie in memory in this order.
+
+    The packets are numbered from `first`. `Entry.events` is filled in, unless they were found
+    before. What follows damage in a packet is left out, and events whose times are far from their
+    packet. Both are reported, with the packet, a byte of it and a message.
+    """
+    _find_events(layout, memory, [entry for entry in entries if entry.events is None], report)
+    events = _read_events(layout, memory, entries, first)
+    return _without_absurd(layout, entries, events, first, report_absurd)
+
+
+def _find_events(
     layout: StreamLayout,
     memory: Memory,
     entries: Sequence[Entry],
     report: Callable[[Entry, int, str], None],
 ) -> None:
-    """Fill in `Entry.events` of packets of one stream class, which lie in memory in this order.
-
-    What follows damage in a packet is left out.
-    """
     if layout.header is None:
         for entry in entries:
             entry.events, damage = _find_field_by_field(layout, memory, entry)
@@ -67,38 +94,42 @@ def find_events(
             report(entry, position - entry.base, message)
 
 
-def read_events(layout: StreamLayout, memory: Memory, entries: Sequence[Entry]) -> Events:
-    """Read the headers of all events that were found in these packets of one stream class."""
-    counts = np.array([_begins(entry).size for entry in entries], np.int64)
+def _read_events(
+    layout: StreamLayout, memory: Memory, entries: Sequence[Entry], first: int
+) -> Events:
+    begins = [_begins(entry) for entry in entries]
+    counts = np.array([each.size for each in begins], np.int64)
+    packets = np.repeat(np.arange(first, first + counts.size, dtype=np.int32), counts)
+    positions = np.concatenate(begins, dtype=np.int64)
     if layout.header is None:
-        return _read_field_by_field(layout, memory, entries, counts)
-    bases = np.array([entry.base for entry in entries], np.int64)
-    positions = np.concatenate([_begins(entry) for entry in entries], dtype=np.int64)
-    positions += np.repeat(bases, counts)
-    befores = np.array([entry.clock_before for entry in entries], np.uint64)
-    return Events(counts, *_read_headers(layout, memory, positions, counts, befores), positions)
+        classes, clock = _read_field_by_field(layout, memory, entries)
+        bodies = np.zeros_like(positions)
+    else:
+        positions += np.repeat(np.array([entry.base for entry in entries], np.int64), counts)
+        befores = np.array([entry.clock_before for entry in entries], np.uint64)
+        classes, clock, bodies = _read_headers(layout, memory, positions, counts, befores)
+    ts_ns = layout.clock.to_ns_array(clock)
+    return Events(packets, classes, clock, ts_ns, bodies, positions)
 
 
-def without_absurd(
+def _without_absurd(
     layout: StreamLayout,
     entries: Sequence[Entry],
     events: Events,
+    first: int,
     report: Callable[[Entry, int, str], None],
 ) -> Events:
-    """Return the events without those whose times are far from their packets.
-
-    `report` is called with the packet, the byte of the first of them, and a message.
-    """
-    limits = np.array([_limits(entry, layout.clock) for entry in entries], np.uint64).reshape(-1, 2)
-    filled = np.flatnonzero(events.counts)
-    if not filled.size:
+    if not events.packets.size:
         return events
-    first = (np.cumsum(events.counts) - events.counts)[filled]
-    is_early = np.minimum.reduceat(events.clock, first) < limits[filled, 0]
-    is_late = np.maximum.reduceat(events.clock, first) > limits[filled, 1]
+    limits = np.array([_limits(entry, layout.clock) for entry in entries], np.uint64)
+    counts = np.array([_begins(entry).size for entry in entries])
+    begins = (np.cumsum(counts) - counts)[counts > 0]
+    earliest, latest = limits[counts > 0].T
+    is_early = np.minimum.reduceat(events.clock, begins) < earliest
+    is_late = np.maximum.reduceat(events.clock, begins) > latest
     if not (is_early | is_late).any():
         return events
-    packets = np.repeat(np.arange(events.counts.size), events.counts)
+    packets = events.packets - first
     good = (events.clock >= limits[packets, 0]) & (events.clock <= limits[packets, 1])
     for place in distinct(packets[~good]).tolist():
         entry = entries[place]
@@ -107,13 +138,7 @@ def without_absurd(
         offset = at // BYTE if layout.header is None else at - entry.base
         number = f"{rows.size} events" if rows.size > 1 else "an event"
         report(entry, offset, f"{number} with a time that makes no sense: left out")
-    return Events(
-        np.bincount(packets[good], minlength=events.counts.size),
-        *(
-            values[good]
-            for values in (events.classes, events.clock, events.bodies, events.positions)
-        ),
-    )
+    return events.take(good)
 
 
 def say_nothing(entry: Entry, offset: int, message: str) -> None:
@@ -149,8 +174,8 @@ def _find_field_by_field(
 
 
 def _read_field_by_field(
-    layout: StreamLayout, memory: Memory, entries: Sequence[Entry], counts: NDArray[np.int64]
-) -> Events:
+    layout: StreamLayout, memory: Memory, entries: Sequence[Entry]
+) -> tuple[NDArray[np.uint32], NDArray[np.uint64]]:
     classes = []
     values = []
     for entry in entries:
@@ -160,14 +185,7 @@ def _read_field_by_field(
             event, clock = reader.header(position, clock)
             classes.append(layout.classes[event.id].number)
             values.append(clock % (1 << 64))
-    positions = np.concatenate([_begins(entry) for entry in entries])
-    return Events(
-        counts,
-        np.array(classes, np.uint32),
-        np.array(values, np.uint64),
-        np.zeros(positions.size, np.int64),
-        positions,
-    )
+    return np.array(classes, np.uint32), np.array(values, np.uint64)
 
 
 def _limits(entry: Entry, clock: Clock) -> tuple[int, int]:

@@ -10,7 +10,7 @@ from msgflow.trace.ctf.event_body import EventBody, Kind
 from msgflow.trace.numpy_arrow import distinct
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
@@ -44,7 +44,10 @@ class FieldRows:
         """
         assert body.fields is not None
         self._fields = body.fields
-        self._options: dict[str, tuple[NDArray[np.int64], NDArray[np.int64], OptionLayout]] = {}
+        # Names of variants and options to the rows that have the option, its begins and layout.
+        self._options: dict[
+            tuple[str, ...], tuple[NDArray[np.int64], NDArray[np.int64], OptionLayout]
+        ] = {}
         self._memory = memory
         self._bodies = bodies
         self._positions: dict[int, NDArray[np.int64]] = {}
@@ -53,13 +56,9 @@ class FieldRows:
         self._first = 0
         self._offsets: tuple[int, ...] | None = None
         if body.variant is not None and with_variant:
-            variant_at = self._follow(len(self._fields) - 1)
-            everywhere = np.arange(bodies.size)
-            values = self.numbers(body.selector)
-            for name, rows, at, option in _options(
-                body.variant, memory, everywhere, variant_at, values
-            ):
-                self._options[f"{body.variant_name}.{name}"] = (rows, at, option)
+            due = self._follow(len(self._fields) - 1)
+            rows, values = np.arange(bodies.size), self.numbers(body.selector)
+            self._find_options((), body.variant, rows, due, values)
         elif body.offsets is None:
             self._follow(max(wanted, default=-1))
         elif len({tuple(offset) for offset in zip(*body.offsets, strict=True)}) <= 1:
@@ -112,14 +111,14 @@ class FieldRows:
         cut, at = _flat(offsets[:-1], lengths, 1)
         return cut, content[at]
 
-    def in_variant(self, path: Sequence[str]) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
+    def in_variant(self, path: tuple[str, ...]) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
         """Return the rows that have a field of the variant, and its values; None if no row has it.
 
         The values of an array have a column for each element. The path is the names of the
         variants, their options and the structures around the field, and its own.
         """
-        for depth in range(len(path) - 1, 0, -1):
-            rows, at, option = self._options.get(".".join(path[:depth]), (None, None, None))
+        for depth in range(2, len(path)):
+            rows, at, option = self._options.get(path[:depth], (None, None, None))
             part = None if option is None else option.parts.get(".".join(path[depth:]))
             if rows is not None and at is not None and part is not None:
                 return rows, _values(self._memory, at, part)
@@ -163,29 +162,27 @@ class FieldRows:
                 at = at + count * field.width
         return at
 
-
-def _options(
-    variant: VariantLayout,
-    memory: Memory,
-    rows: NDArray[np.int64],
-    due: NDArray[np.int64],
-    values: NDArray[Any],
-) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.int64], OptionLayout]]:
-    """Yield each chosen option: its name, the rows that have it, where it begins, its layout."""
-    present = distinct(values).tolist()
-    for choice, option in variant.options:
-        choosing = [value for value in present if variant.option(value) is option]
-        if not choosing:
-            continue
-        is_chosen = np.isin(values, choosing)
-        chosen = rows[is_chosen]
-        at = (due[is_chosen] + (option.align - 1)) & -option.align
-        yield choice.name, chosen, at, option
-        if option.variant is not None:
-            selected = _values(memory, at, option.parts[option.selector])
-            inner = _options(option.variant, memory, chosen, at + option.size, selected)
-            for name, found, found_at, inner_option in inner:
-                yield f"{choice.name}.{option.name}.{name}", found, found_at, inner_option
+    def _find_options(
+        self,
+        path: tuple[str, ...],
+        variant: VariantLayout,
+        rows: NDArray[np.int64],
+        due: NDArray[np.int64],
+        values: NDArray[Any],
+    ) -> None:
+        """Find the rows of each option of a variant that is due at these bytes of memory."""
+        present = distinct(values).tolist()
+        for option in variant.options:
+            choosing = [value for value in present if variant.option(value) is option]
+            if not choosing:
+                continue
+            is_chosen = np.isin(values, choosing)
+            chosen, at = rows[is_chosen], (due[is_chosen] + (option.align - 1)) & -option.align
+            inner = (*path, variant.name, option.choice.name)
+            self._options[inner] = chosen, at, option
+            if option.variant is not None:
+                selected = _values(self._memory, at, option.parts[option.variant.selector])
+                self._find_options(inner, option.variant, chosen, at + option.size, selected)
 
 
 def _values(memory: Memory, at: NDArray[np.int64], part: Part) -> NDArray[Any]:

@@ -256,6 +256,8 @@ class EventReader:
         event = self._stream.events.get(reader.found[Role.EVENT_CLASS])
         if event is None:
             raise FieldError(f"there is no event class {reader.found[Role.EVENT_CLASS]}")
+        if not self._stream.has_time:
+            return event, clock
         time, bits = reader.found.get(Role.TIME, clock), reader.bits.get(Role.TIME, 64)
         return event, time if bits == 64 else clock + (time - clock) % (1 << bits)
 

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum, StrEnum
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 BYTE = 8
 # Limits of what metadata may declare.
-MOST_BITS = 64
-MOST_ALIGN = 1 << 20
-MOST_ELEMENTS = 1 << 40
+_MOST_BITS = 64
+_MOST_ALIGN = 1 << 20
+_MOST_ELEMENTS = 1 << 40
+_MOST_FIELDS = 100_000
+_DEEPEST = 32
 _UUID_BYTES = 16
 
 
@@ -77,6 +80,11 @@ class Integer:
     arrow: str = "integer"  # 'integer', 'bool' or 'bits': kind of the Arrow type
     base: int = 10  # number base for showing it: 10 or 16
 
+    def __post_init__(self) -> None:
+        if not 1 <= self.size <= _MOST_BITS:
+            raise MetadataError(f"an integer of {self.size} bits makes no sense")
+        _check_align(self.align)
+
 
 @dataclass(frozen=True)
 class VariableInteger:
@@ -96,6 +104,11 @@ class Real:
     align: int
     big_endian: bool
 
+    def __post_init__(self) -> None:
+        if self.size not in {32, 64}:
+            raise MetadataError("a floating point number must have 32 or 64 bits")
+        _check_align(self.align)
+
 
 @dataclass(frozen=True)
 class String:
@@ -104,16 +117,35 @@ class String:
     align: int = BYTE
 
 
-class _Elements:
+class _Compound:
+    """Common properties of types with others inside, which could grow without limit."""
+
+    minimum_align: int = 1
+
+    def __post_init__(self) -> None:
+        _check_align(self.minimum_align)
+        fields, depth = self.extent
+        if fields > _MOST_FIELDS:
+            raise MetadataError(f"a structure has more than {_MOST_FIELDS} fields")
+        if depth > _DEEPEST:
+            raise MetadataError("too deeply nested")
+
+    @cached_property
+    def extent(self) -> tuple[int, int]:
+        """Number of all fields inside, this one included, and how deep they are nested."""
+        inner = [each.extent if isinstance(each, _Compound) else (1, 1) for each in parts(self)]
+        return 1 + sum(fields for fields, _ in inner), 1 + max((d for _, d in inner), default=0)
+
+    @cached_property
+    def align(self) -> int:
+        """Alignment of what is inside, even where there is nothing."""
+        return max([self.minimum_align, *(part.align for part in parts(self))])
+
+
+class _Elements(_Compound):
     """Common properties of arrays and sequences."""
 
     element: Type
-    minimum_align: int
-
-    @property
-    def align(self) -> int:
-        """Alignment of the elements, even where there are none."""
-        return max(self.minimum_align, self.element.align)
 
     @property
     def is_text(self) -> bool:
@@ -131,6 +163,11 @@ class Array(_Elements):
     length: int
     minimum_align: int = 1
     roles: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.length <= _MOST_ELEMENTS:
+            raise MetadataError(f"an array of {self.length} elements makes no sense")
+        super().__post_init__()
 
 
 @dataclass(frozen=True)
@@ -151,16 +188,11 @@ class Member:
 
 
 @dataclass(frozen=True)
-class Structure:
+class Structure(_Compound):
     """Fields one after the other."""
 
     members: tuple[Member, ...] = ()
     minimum_align: int = 1
-    align: int = field(init=False)
-
-    def __post_init__(self) -> None:
-        aligns = (member.type.align for member in self.members)
-        object.__setattr__(self, "align", max(self.minimum_align, *aligns, 1))
 
 
 @dataclass(frozen=True)
@@ -177,7 +209,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Variant:
+class Variant(_Compound):
     """One of several types, as a selector says; it has no alignment of its own."""
 
     selector: Reference
@@ -186,7 +218,7 @@ class Variant:
 
 
 @dataclass(frozen=True)
-class Optional:
+class Optional(_Compound):
     """A field that is there if the selector has one of these values."""
 
     selector: Reference
@@ -198,7 +230,7 @@ class Optional:
 Type = Integer | VariableInteger | Real | String | Array | Sequence | Structure | Variant | Optional
 
 
-def parts(declared: Type) -> list[Type]:
+def parts(declared: object) -> list[Type]:
     """Return the types directly inside a type."""
     match declared:
         case Structure(members=members):
@@ -226,3 +258,16 @@ def may_have(declared: Type, role: str) -> bool:
 def aligned(position: int, align: int) -> int:
     """Return the first multiple of `align` (a power of two) at or after the position."""
     return (position + align - 1) & -align
+
+
+def integer_of(declared: Mapping[str, Any], key: str, default: int | None) -> int:
+    """Return a number that the metadata declare."""
+    value = declared.get(key, default)
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise MetadataError(f"`{key}` is missing or no integer")
+    return value
+
+
+def _check_align(align: int) -> None:
+    if align < 1 or align & (align - 1) or align > _MOST_ALIGN:
+        raise MetadataError(f"an alignment of {align} bits makes no sense")

@@ -11,7 +11,14 @@ from uuid import UUID
 from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
-from msgflow.trace.ctf.field_types import BYTE, MetadataError, Reference, Scope, may_have
+from msgflow.trace.ctf.field_types import (
+    BYTE,
+    MetadataError,
+    Reference,
+    Scope,
+    integer_of,
+    may_have,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -199,34 +206,33 @@ class TypeReader:
                 return replace(integer, roles=_roles(declared, integer))
             case "fixed-length-floating-point-number":
                 size = integer_of(declared, "length", None)
-                if size not in {32, 64}:
-                    raise MetadataError("a floating point number must have 32 or 64 bits")
-                return ctf.Real(size, _align(declared, "alignment"), _is_big_endian(declared))
+                align = integer_of(declared, "alignment", 1)
+                return ctf.Real(size, align, _is_big_endian(declared))
             case "null-terminated-string":
                 _check_encoding(declared)
                 return ctf.String()
             case "static-length-string":
                 _check_encoding(declared)
-                return ctf.Array(_CHARACTER, _length(declared))
+                return ctf.Array(_CHARACTER, integer_of(declared, "length", None))
             case "dynamic-length-string":
                 _check_encoding(declared)
                 return ctf.Sequence(_CHARACTER, _reference(declared, "length-field-location"))
             case "static-length-blob":
-                blob = ctf.Array(_BYTE, _length(declared))
+                blob = ctf.Array(_BYTE, integer_of(declared, "length", None))
                 return replace(blob, roles=_roles(declared, blob))
             case "dynamic-length-blob":
                 return ctf.Sequence(_BYTE, _reference(declared, "length-field-location"))
             case "static-length-array":
                 return ctf.Array(
                     self._type(declared.get("element-field-class")),
-                    _length(declared),
-                    _align(declared, "minimum-alignment"),
+                    integer_of(declared, "length", None),
+                    integer_of(declared, "minimum-alignment", 1),
                 )
             case "dynamic-length-array":
                 return ctf.Sequence(
                     self._type(declared.get("element-field-class")),
                     _reference(declared, "length-field-location"),
-                    _align(declared, "minimum-alignment"),
+                    integer_of(declared, "minimum-alignment", 1),
                 )
             case "structure":
                 return self._structure(declared)
@@ -248,7 +254,7 @@ class TypeReader:
             ctf.Member(str(member.get("name")), self._type(member.get("field-class")))
             for member in _objects(declared, "member-classes")
         ]
-        return ctf.Structure(tuple(members), _align(declared, "minimum-alignment"))
+        return ctf.Structure(tuple(members), integer_of(declared, "minimum-alignment", 1))
 
     def _variant(self, declared: dict[str, Any]) -> ctf.Variant:
         choices = [
@@ -262,21 +268,10 @@ class TypeReader:
         return ctf.Variant(_reference(declared, "selector-field-location"), tuple(choices))
 
 
-def integer_of(declared: dict[str, Any], key: str, default: int | None) -> int:
-    """Return a number of an object."""
-    value = declared.get(key, default)
-    if not isinstance(value, int) or isinstance(value, bool):
-        raise MetadataError(f"`{key}` is missing or no integer")
-    return value
-
-
 def _integer(declared: dict[str, Any], kind: str) -> ctf.Integer:
-    size = integer_of(declared, "length", None)
-    if not 1 <= size <= ctf.MOST_BITS:
-        raise MetadataError(f"an integer of {size} bits makes no sense")
     integer = ctf.Integer(
-        size=size,
-        align=_align(declared, "alignment"),
+        size=integer_of(declared, "length", None),
+        align=integer_of(declared, "alignment", 1),
         big_endian=_is_big_endian(declared),
         signed=kind == "fixed-length-signed-integer",
         labels=_labels(declared),
@@ -294,20 +289,6 @@ def _is_big_endian(declared: dict[str, Any]) -> bool:
     if declared.get("bit-order", _BIT_ORDERS[big_endian]) != _BIT_ORDERS[big_endian]:
         raise MetadataError("a bit order that does not follow the byte order is not supported")
     return big_endian
-
-
-def _align(declared: dict[str, Any], key: str) -> int:
-    align = integer_of(declared, key, 1)
-    if align < 1 or align & (align - 1) or align > ctf.MOST_ALIGN:
-        raise MetadataError(f"an alignment of {align} bits makes no sense")
-    return align
-
-
-def _length(declared: dict[str, Any]) -> int:
-    length = integer_of(declared, "length", None)
-    if not 0 <= length <= ctf.MOST_ELEMENTS:
-        raise MetadataError(f"a length of {length} makes no sense")
-    return length
 
 
 def _labels(declared: dict[str, Any]) -> dict[str, Ranges] | None:

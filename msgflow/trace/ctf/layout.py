@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TYPE_CHECKING, Literal, TypeGuard
 
 from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.field_types import BYTE, FieldError, aligned
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
 
 _MOST_STEPS = 100_000
@@ -99,39 +99,39 @@ class Part:
 class OptionLayout:
     """A structure of fixed size, and the variant that it may end in."""
 
+    choice: ctf.Choice  # as declared
     align: int  # in bytes
     size: int  # of the fixed part, in bytes
     parts: Mapping[str, Part]  # name, with dots inside nested structures, to where it is
-    selector: str = ""  # name of the part that chooses the option of `variant`
-    variant: VariantLayout | None = None
-    name: str = ""  # of the variant
+    variant: VariantLayout | None
 
 
 @dataclass(frozen=True)
 class VariantLayout:
-    """The options of a variant."""
+    """A variant whose options are structures of fixed size."""
 
-    options: tuple[tuple[ctf.Choice, OptionLayout], ...]  # declaration and layout of each option
+    name: str
+    selector: str  # name of the member in front of it that chooses the option
+    options: tuple[OptionLayout, ...]
     _chosen: dict[int, OptionLayout] = field(default_factory=dict, compare=False, repr=False)
 
     def option(self, value: int) -> OptionLayout:
         """Return the option that this value of the selector chooses."""
-        chosen = self._chosen.get(value)
-        if chosen is None:
-            for choice, option in self.options:
-                if choice.holds(value):
-                    self._chosen[value] = option
-                    return option
-            raise FieldError(f"a variant has no option for the value {value}")
-        return chosen
+        if value not in self._chosen:
+            found = (option for option in self.options if option.choice.holds(value))
+            option = next(found, None)
+            if option is None:
+                raise FieldError(f"a variant has no option for the value {value}")
+            self._chosen[value] = option
+        return self._chosen[value]
 
     def has(self, path: Sequence[str]) -> bool:
-        """Tell whether there is a field at this path: option, and names of members in it."""
-        for choice, option in self.options:
-            if choice.name == path[0]:
-                is_inner = option.variant is not None and option.name == path[1]
-                return ".".join(path[1:]) in option.parts or (
-                    is_inner and option.variant is not None and option.variant.has(path[2:])
+        """Tell whether there is a field at this path: variant, option, and names of members."""
+        for option in self.options:
+            if tuple(path[:2]) == (self.name, option.choice.name):
+                inner = path[2:]
+                return ".".join(inner) in option.parts or (
+                    option.variant is not None and option.variant.has(inner)
                 )
         return False
 
@@ -145,54 +145,47 @@ class VariantLayout:
                 raise FieldError("a field goes beyond the end of the packet")
             if option.variant is None:
                 return position
-            part = option.parts[option.selector]
+            part = option.parts[option.variant.selector]
             at = begin + part.offset
-            order = "big" if part.dtype[0] == ">" else "little"
-            option = option.variant.option(
-                int.from_bytes(data[at : at + part.width], order)  # type: ignore[arg-type]
-            )
+            order: Literal["big", "little"] = "big" if part.dtype[0] == ">" else "little"
+            option = option.variant.option(int.from_bytes(data[at : at + part.width], order))
 
 
-def lay_out_variant(variant: ctf.Variant) -> VariantLayout | None:
-    """Compile the layout of a variant; None if an option is no structure of fixed size."""
-    options = []
-    for choice in variant.choices:
-        if not isinstance(choice.type, ctf.Structure):
-            return None
-        option = _lay_out_option(choice.type)
-        if option is None:
-            return None
-        options.append((choice, option))
-    return VariantLayout(tuple(options))
+def without_variant(
+    structure: ctf.Structure, scopes: Collection[ctf.Scope | None]
+) -> tuple[ctf.Structure, VariantLayout | None]:
+    """Return a structure without the variant that it ends in, and the layout of that one.
+
+    Its selector, an unsigned integer of whole bytes, is a member in front of it, to which it refers
+    by one of the scopes. A DynamicError says that it has no such layout.
+    """
+    last = structure.members[-1] if structure.members else None
+    if last is None or not isinstance(last.type, ctf.Variant):
+        return structure, None
+    fixed, reference = structure.members[:-1], last.type.selector
+    selector = next((each.type for each in fixed[::-1] if (each.name,) == reference.path), None)
+    if (
+        reference.scope not in scopes
+        or not isinstance(selector, ctf.Integer)
+        or selector.signed
+        or not _is_whole(selector)
+    ):
+        raise DynamicError
+    options = tuple(map(_lay_out_option, last.type.choices))
+    layout = VariantLayout(last.name, str(reference.path[0]), options)
+    return ctf.Structure(fixed, structure.align), layout
 
 
-def is_selector(declared: ctf.Type) -> bool:
-    """Tell whether a field of this type can be a selector: an unsigned integer of whole bytes."""
-    return isinstance(declared, ctf.Integer) and not declared.signed and _is_whole(declared)
-
-
-def _lay_out_option(structure: ctf.Structure) -> OptionLayout | None:
-    members = structure.members
-    last = members[-1] if members else None
-    variant = last.type if last is not None and isinstance(last.type, ctf.Variant) else None
-    fixed = members if variant is None else members[:-1]
+def _lay_out_option(choice: ctf.Choice) -> OptionLayout:
+    if not isinstance(choice.type, ctf.Structure):
+        raise DynamicError
+    fixed, variant = without_variant(choice.type, {None})
     leaves: list[Leaf] = []
-    try:
-        end = lay_out(ctf.Structure(fixed, structure.align), 0, leaves)
-    except DynamicError:
-        return None
-    align, size = max(structure.align // BYTE, 1), -(-end // BYTE)
+    end = lay_out(fixed, 0, leaves)
     parts = {".".join(leaf.path): part for leaf in leaves if (part := _part(leaf)) is not None}
-    if variant is None or last is None:
-        return OptionLayout(align, size, parts)
-    reference, layout = variant.selector, lay_out_variant(variant)
-    selector = reference.path[0] if len(reference.path) == 1 and reference.scope is None else None
-    declared = next((member.type for member in fixed if member.name == selector), None)
-    if layout is None or selector is None or declared is None or end % BYTE:
-        return None
-    if not is_selector(declared) or selector not in parts:
-        return None
-    return OptionLayout(align, size, parts, selector, layout, last.name)
+    if variant is not None and (end % BYTE or variant.selector not in parts):
+        raise DynamicError
+    return OptionLayout(choice, max(fixed.align // BYTE, 1), -(-end // BYTE), parts, variant)
 
 
 def _part(leaf: Leaf) -> Part | None:

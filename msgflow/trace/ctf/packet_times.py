@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from msgflow.trace.ctf.events import find_events, read_events, say_nothing, without_absurd
+from msgflow.trace.ctf.events import events_of, say_nothing
 from msgflow.trace.ctf.packet_memory import Loader
 from msgflow.trace.ctf.packet_order import Entry
 
@@ -57,8 +57,6 @@ def _clock_values(stream: Stream, packet: Packet, begin: int) -> NDArray[np.uint
     entry = Entry(stream, packet, 0, begin, 0, 0, 0)
     try:
         loader.load([entry])
-        find_events(stream.layout, loader.memory, [entry], say_nothing)
-        events = read_events(stream.layout, loader.memory, [entry])
-        return without_absurd(stream.layout, [entry], events, say_nothing).clock
+        return events_of(stream.layout, loader.memory, [entry], say_nothing, say_nothing).clock
     finally:
         loader.close()

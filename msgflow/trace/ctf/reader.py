@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import metadata
 from msgflow.trace.ctf.batches import Iteration
-from msgflow.trace.ctf.declarations import give_order
 from msgflow.trace.ctf.event_positions import BEYOND_END
 from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.ctf.losses import LossCounter
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from msgflow.trace.archived_traces import Unpacked
     from msgflow.trace.ctf.losses import Continuation
     from msgflow.trace.ctf.packet_order import Entry
     from msgflow.trace.ctf.packets import Packet, Stream
@@ -44,6 +44,7 @@ class CtfTraceSet(TraceSet):
         self,
         locations: Sequence[TraceLocation],
         *,
+        archives: Unpacked | None = None,
         strict: bool = False,
         after: Continuation | None = None,
     ) -> None:
@@ -52,7 +53,7 @@ class CtfTraceSet(TraceSet):
         `strict` ends at the first damage. `after` holds what was read before of the same
         recordings, and takes these parts in. They can be read only once then.
         """
-        super().__init__()
+        super().__init__(archives)
         self._strict = strict
         self._layouts: list[StreamLayout] = []
         self._streams: list[Stream] = []
@@ -74,22 +75,18 @@ class CtfTraceSet(TraceSet):
         except OSError as error:
             raise unreadable_error(error, path) from error
         if not location.size_bytes:
-            return TraceInfo(index, path)
+            return TraceInfo(index, self.shown(path))
         if all(stream_class.clock is None for stream_class in declared.streams.values()):
             for stream_class in declared.streams.values():
-                give_order(stream_class)
+                stream_class.give_order()
         layouts = {}
         for stream_class in declared.streams.values():
             number = sum(len(layout.classes) for layout in self._layouts)
-            try:
-                layout = StreamLayout(index, declared, stream_class, number)
-            except RecursionError as error:
-                raise metadata.damaged_error(path, "too deeply nested") from error
-            layouts[stream_class.id] = layout
+            layout = layouts[stream_class.id] = StreamLayout(index, declared, stream_class, number)
             self._layouts.append(layout)
 
         def report(file: Path, position: int, offset: int, message: str) -> None:
-            self._report(Damage(index, file, position, offset, message))
+            self._report(Damage(index, self.shown(file), position, offset, message))
 
         for file in location.strays:
             report(file, 0, 0, "a stream without `metadata`, which is missing or renamed: left out")
@@ -108,7 +105,7 @@ class CtfTraceSet(TraceSet):
         for stream in streams:
             stream.rank = len(self._streams)
             self._streams.append(stream)
-        return describe(declared, path, index, streams)
+        return describe(declared, self.shown(path), index, streams)
 
     def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
         self.damages = list(self._found_early)
@@ -132,7 +129,6 @@ class CtfTraceSet(TraceSet):
         finally:
             self.event_counts = iteration.event_counts()
             self.damages.sort(key=lambda damage: (damage.trace_index, damage.file, damage.offset))
-            self._running = None
 
     def _report_in_packet(self, entry: Entry, offset: int, message: str) -> None:
         packet = entry.packet
@@ -141,7 +137,7 @@ class CtfTraceSet(TraceSet):
         self._report(
             Damage(
                 entry.stream.trace_index,
-                packet.path,
+                self.shown(packet.path),
                 packet.number,
                 packet.offset + offset,
                 message,

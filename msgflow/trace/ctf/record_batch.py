@@ -19,7 +19,7 @@ from msgflow.trace.ctf.arrow import (
 from msgflow.trace.ctf.event_body import Kind
 from msgflow.trace.ctf.field_columns import FieldRows
 from msgflow.trace.ctf.field_types import Scope, Structure
-from msgflow.trace.numpy_arrow import integers_to_arrow, texts_to_arrow, to_arrow, to_numpy
+from msgflow.trace.numpy_arrow import texts_to_arrow, to_arrow, to_numpy
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -59,18 +59,11 @@ class ClassPlan:
         body = self.layout.body
         if self.stream.header is None or body.fields is None:
             return True
-        paths = [
-            path
-            for source in self.sources
-            if source is not None and source.number is None
-            for path in source.paths
-        ]
+        others = [source for source in self.sources if source is not None and source.number is None]
         return not all(
-            body.variant is not None
-            and path[0] == body.variant_name
-            and len(path) > 1
-            and body.variant.has(path[1:])
-            for path in paths
+            body.variant is not None and body.variant.has(path)
+            for source in others
+            for path in source.paths
         )
 
 
@@ -91,32 +84,31 @@ def build_batch(
     batch: Batch,
     rows: NDArray[np.int64],
     first_id: int,
-    names: ThreadNames,
     reader_at: Callable[[int, int], tuple[EventReader, int]],
 ) -> pa.RecordBatch:
     """Build a batch of events of one class, rows of `batch` in their order.
 
-    `first_id` is the number of the first event of `batch`, `names` are the thread names seen so
-    far. `reader_at` takes a packet of the batch and the position of an event. It returns what reads
-    the packet field by field, and the bit at which the event begins.
+    `first_id` is the number of the first event of `batch`. `reader_at` takes a packet of the batch
+    and the position of an event. It returns what reads the packet field by field, and the bit at
+    which the event begins.
     """
-    count, packets = rows.size, batch.in_packet[rows]
+    count, events, at = rows.size, batch.events, batch.rows[rows]
+    packets = events.packets[at]
     without_cpu = None if batch.has_cpu is None else ~batch.has_cpu[packets]
     arrays = [
         to_arrow(rows + first_id),
-        to_arrow(batch.ts_ns[rows]),
+        to_arrow(events.ts_ns[at]),
         to_arrow(np.full(count, plan.stream.trace_index, np.int32)),
         to_arrow(batch.cpus[packets], without_cpu),
     ]
-    field_of: _GatheredColumns | _FieldByField
     if plan.is_field_by_field:
-        at = map(reader_at, packets.tolist(), batch.positions[rows].tolist())
-        field_of = _FieldByField([reader.event(bit) for reader, bit in at], names)
+        places = map(reader_at, packets.tolist(), events.positions[at].tolist())
+        array = _field_by_field([reader.event(bit) for reader, bit in places])
     else:
-        field_of = _GatheredColumns(plan, batch.memory, batch.bodies[rows], names)
+        array = _gathered(plan, batch.memory, events.bodies[at])
     for field, source in zip(list(plan.schema)[_LEADING:], plan.sources, strict=True):
         if source is not None:
-            arrays.append(field_of.array(source, field.type))
+            arrays.append(array(source, field.type))
         elif field.nullable:
             arrays.append(pa.nulls(count, field.type))
         else:
@@ -124,56 +116,64 @@ def build_batch(
     return pa.RecordBatch.from_arrays(arrays, schema=plan.schema)
 
 
-class _GatheredColumns:
-    """Columns gathered from memory, for all events at once."""
+def _gathered(
+    plan: ClassPlan, memory: Memory, bodies: NDArray[np.int64]
+) -> Callable[[Source, pa.DataType], pa.Array]:
+    """Return what gathers a column from memory, for all events at once."""
+    fields = plan.layout.body.fields or ()
+    numbers = {source.number for source in plan.sources if source is not None}
+    wanted = sorted(number for number in numbers if number is not None)
+    rows = FieldRows(plan.layout.body, memory, bodies, wanted, with_variant=None in numbers)
 
-    def __init__(
-        self, plan: ClassPlan, memory: Memory, bodies: NDArray[np.int64], names: ThreadNames
-    ) -> None:
-        body = plan.layout.body
-        numbers = {source.number for source in plan.sources if source is not None}
-        wanted = sorted(number for number in numbers if number is not None)
-        self._fields = body.fields or ()
-        self._names = names
-        self._rows = FieldRows(body, memory, bodies, wanted, with_variant=None in numbers)
-        self._count = bodies.size
-
-    def array(self, source: Source, data_type: pa.DataType) -> pa.Array:
+    def array(source: Source, data_type: pa.DataType) -> pa.Array:
         number = source.number
         if number is None:
-            found = map(self._rows.in_variant, source.paths)
+            found = map(rows.in_variant, source.paths)
             present = [values for values in found if values is not None]
-            return scattered_array(present, self._count, data_type)
-        field = self._fields[number]
-        if pa.types.is_dictionary(data_type):
-            return self._thread_names(number)
+            return scattered_array(present, bodies.size, data_type)
+        field = fields[number]
+        if pa.types.is_dictionary(data_type) and field.kind is Kind.TEXT and field.count:
+            return _short_names(rows.words(number, f"V{field.count}"))
         if field.kind is Kind.NUMBER:
-            return number_array(self._rows.numbers(number), data_type)
-        if pa.types.is_string(data_type):
-            return text_array(*self._rows.text(number))
-        return list_array(*self._rows.elements(number), data_type)
+            return number_array(rows.numbers(number), data_type)
+        if pa.types.is_list(data_type):
+            return list_array(*rows.elements(number), data_type)
+        texts = text_array(*rows.text(number))
+        return texts.dictionary_encode() if pa.types.is_dictionary(data_type) else texts
 
-    def _thread_names(self, number: int) -> pa.Array:
-        field = self._fields[number]
-        if field.kind is Kind.TEXT and field.count:
-            return self._names.array_of_bytes(self._rows.words(number, f"V{field.count}"))
-        return self._names.array_of(text_array(*self._rows.text(number)).to_pylist())
+    return array
 
 
-class _FieldByField:
-    """Columns of events that are read field by field: slower, but any layout will do."""
+def _short_names(content: NDArray[Any]) -> pa.Array:
+    """Return names that end at their first NUL; few of them differ.
 
-    def __init__(
-        self, events: Sequence[Mapping[Scope, Mapping[str, Any]]], names: ThreadNames
-    ) -> None:
-        self._events = events
-        self._names = names
+    `content` has the bytes of each name as one item of numpy's type `V`.
+    """
+    size, count = content.dtype.itemsize, content.size
+    buffer = pa.py_buffer(np.ascontiguousarray(content))
+    encoded = pa.Array.from_buffers(pa.binary(size), count, [None, buffer]).dictionary_encode()
+    names = [
+        name.partition(b"\0")[0].decode("utf-8", "replace")
+        for name in encoded.dictionary.to_pylist()
+    ]
+    # Names may differ in what is behind the NUL alone.
+    distinct = texts_to_arrow(names).dictionary_encode()
+    indices = to_numpy(distinct.indices)[to_numpy(encoded.indices)]
+    return pa.DictionaryArray.from_arrays(to_arrow(indices), distinct.dictionary)
 
-    def array(self, source: Source, data_type: pa.DataType) -> pa.Array:
-        values = [first_inner_value(event[source.scope], source.paths) for event in self._events]
+
+def _field_by_field(
+    events: Sequence[Mapping[Scope, Mapping[str, Any]]],
+) -> Callable[[Source, pa.DataType], pa.Array]:
+    """Return what makes a column of events that were read field by field."""
+
+    def array(source: Source, data_type: pa.DataType) -> pa.Array:
+        values = [first_inner_value(event[source.scope], source.paths) for event in events]
         if pa.types.is_dictionary(data_type):
-            return self._names.array_of(values)
+            return texts_to_arrow(values).dictionary_encode()
         return to_array(values, data_type)
+
+    return array
 
 
 def _sources(
@@ -188,38 +188,3 @@ def _sources(
         Source(scope, paths, numbers.get(paths[0])) if paths else None
         for paths in paths_of(columns, declared_schema(structure))
     ]
-
-
-class ThreadNames:
-    """Names of threads seen so far: one dictionary for all batches, as few names repeat."""
-
-    def __init__(self) -> None:
-        self._index_of_name: dict[str, int] = {}
-        self._dictionary = texts_to_arrow([])
-
-    def array_of(self, names: Iterable[str | None]) -> pa.Array:
-        """Return an array of names given one by one."""
-        indexes = [None if name is None else self._index_of(name) for name in names]
-        return self._array(integers_to_arrow(indexes, pa.int32()))
-
-    def array_of_bytes(self, content: NDArray[Any]) -> pa.Array:
-        """Return an array of names that end at their first NUL.
-
-        `content` has the bytes of each name as one item of numpy's type `V`.
-        """
-        size, count = content.dtype.itemsize, content.size
-        buffer = pa.py_buffer(np.ascontiguousarray(content))
-        encoded = pa.Array.from_buffers(pa.binary(size), count, [None, buffer]).dictionary_encode()
-        indexes = [
-            self._index_of(name.partition(b"\0")[0].decode("utf-8", "replace"))
-            for name in encoded.dictionary.to_pylist()
-        ]
-        return self._array(to_arrow(np.array(indexes, np.int32)[to_numpy(encoded.indices)]))
-
-    def _index_of(self, name: str) -> int:
-        return self._index_of_name.setdefault(name, len(self._index_of_name))
-
-    def _array(self, indexes: pa.Array) -> pa.Array:
-        if len(self._dictionary) < len(self._index_of_name):
-            self._dictionary = texts_to_arrow(list(self._index_of_name))
-        return pa.DictionaryArray.from_arrays(indexes, self._dictionary)

@@ -69,7 +69,7 @@ class StreamLayout:
         # size in bytes.
         self._short_forms: dict[int, tuple[EventBody, int]] = {}
         if align // BYTE <= _MOST_RESIDUES:
-            self.header = compile_header(stream.event_header, self.residues)
+            self.header = compile_header(stream, self.residues)
         if self.header is not None and self.header.largest_size > GAP:
             # Reading it all at once might go beyond the end of the memory.
             self.header = None

@@ -9,7 +9,14 @@ from uuid import UUID
 from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.clock import Clock
 from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
-from msgflow.trace.ctf.field_types import MetadataError, Reference, Role, Scope, may_have
+from msgflow.trace.ctf.field_types import (
+    MetadataError,
+    Reference,
+    Role,
+    Scope,
+    integer_of,
+    may_have,
+)
 from msgflow.trace.ctf.tsdl_tokens import Token, tokens_of
 from msgflow.trace.ctf.tsdl_types import TypeParser, Value, without_prefix
 
@@ -41,7 +48,6 @@ _SCOPES = {
     "context": Scope.SPECIFIC_CONTEXT,
     "fields": Scope.PAYLOAD,
 }
-_MOST_FIELDS = 100_000
 Frames = list[dict[str, ctf.Type]]
 
 
@@ -52,17 +58,14 @@ class _Block:
     values: dict[str, Value] = field(default_factory=dict)
     structures: dict[Scope, ctf.Structure] = field(default_factory=dict)
 
-    def integer(self, name: str, default: int) -> int:
-        value = self.values.get(name, default)
-        if not isinstance(value, int):
-            raise MetadataError(f"`{name}` is no number")
-        return value
-
 
 def parse(text: str) -> TraceClass:
     """Parse metadata."""
     blocks = _Blocks(tokens_of(text))
-    blocks.parse()
+    try:
+        blocks.parse()
+    except MetadataError as error:
+        raise MetadataError(f"line {blocks.token.line}: {error}") from error
     return _trace_class(blocks)
 
 
@@ -96,7 +99,7 @@ class _Blocks(TypeParser):
             elif kind == "event":
                 self.events.append(block)
             elif kind != "callsite":
-                raise self.error(f"there is no block {kind!r}")
+                raise MetadataError(f"there is no block {kind!r}")
 
     def _block(self) -> _Block:
         block = _Block()
@@ -108,7 +111,7 @@ class _Blocks(TypeParser):
             name = str(self.value())
             if self.take_if(":="):
                 if name not in _SCOPES:
-                    raise self.error(f"there is no structure {name!r}")
+                    raise MetadataError(f"there is no structure {name!r}")
                 block.structures[_SCOPES[name]] = self.structure()
             else:
                 self.expect("=")
@@ -153,7 +156,7 @@ def _trace_class(blocks: _Blocks) -> TraceClass:
         for scope in (Scope.PACKET_CONTEXT, Scope.EVENT_HEADER, Scope.EVENT_CONTEXT):
             _add(stream_scopes, block, scope)
         stream = StreamClass(
-            id=block.integer("id", 0),
+            id=integer_of(block.values, "id", 0),
             packet_context=stream_scopes[Scope.PACKET_CONTEXT],
             event_header=stream_scopes[Scope.EVENT_HEADER],
             event_context=stream_scopes[Scope.EVENT_CONTEXT],
@@ -164,14 +167,14 @@ def _trace_class(blocks: _Blocks) -> TraceClass:
         trace.streams[stream.id] = stream
         scopes[stream.id] = stream_scopes
     for block in blocks.events:
-        stream_id = block.integer("stream_id", next(iter(trace.streams)))
+        stream_id = integer_of(block.values, "stream_id", next(iter(trace.streams)))
         if stream_id not in trace.streams:
             raise MetadataError(f"there is no stream {stream_id}")
         event_scopes = dict(scopes[stream_id])
         for scope in (Scope.SPECIFIC_CONTEXT, Scope.PAYLOAD):
             _add(event_scopes, block, scope)
         event = EventClass(
-            id=block.integer("id", 0),
+            id=integer_of(block.values, "id", 0),
             name=str(block.values.get("name", "")),
             specific_context=event_scopes[Scope.SPECIFIC_CONTEXT],
             payload=event_scopes[Scope.PAYLOAD],
@@ -211,9 +214,9 @@ def _mapped_clocks(declared: ctf.Type) -> list[str]:
 def _clock(block: _Block, notes: list[str]) -> Clock:
     name = block.values.get("name")
     return Clock(
-        frequency=block.integer("freq", Clock.frequency),
-        offset_seconds=block.integer("offset_s", 0),
-        offset_cycles=block.integer("offset", 0),
+        frequency=integer_of(block.values, "freq", Clock.frequency),
+        offset_seconds=integer_of(block.values, "offset_s", 0),
+        offset_cycles=integer_of(block.values, "offset", 0),
         name=None if name is None else str(name),
         uuid=_uuid(block),
     ).plausible(notes)
@@ -239,7 +242,6 @@ class _Resolver:
         self._scope = scope
         self._scopes = scopes
         self._roles = _ROLES.get(scope, {})
-        self._count = 0
 
     def structure(self, declared: ctf.Structure, frames: Frames) -> ctf.Structure:
         frame: dict[str, ctf.Type] = {}
@@ -258,10 +260,6 @@ class _Resolver:
         return declared
 
     def _type(self, declared: ctf.Type, frames: Frames) -> ctf.Type:
-        self._count += 1
-        if self._count > _MOST_FIELDS:
-            # Structures that contain others by name can grow without limit.
-            raise MetadataError(f"a structure has more than {_MOST_FIELDS} fields")
         match declared:
             case ctf.Structure():
                 return self.structure(declared, frames)

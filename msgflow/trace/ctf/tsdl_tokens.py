@@ -86,12 +86,12 @@ class TokenStream:
     def expect(self, value: str) -> None:
         """Go on over this sign or name."""
         if not self.take_if(value):
-            raise self.error(f"expected {value!r}, found {self.token.value!r}")
+            raise MetadataError(f"expected {value!r}, found {self.token.value!r}")
 
     def name(self) -> str:
         """Take a name."""
         if self.token.kind != "name":
-            raise self.error(f"expected a name, found {self.token.value!r}")
+            raise MetadataError(f"expected a name, found {self.token.value!r}")
         return self.take().value
 
     def number(self) -> int:
@@ -102,27 +102,23 @@ class TokenStream:
         if self.token.kind == "character":
             text = _unescaped(self.token.value.lstrip("L")[1:-1])
             if len(text) > 1:
-                raise self.error(f"{self.token.value:.20} is more than one character")
+                raise MetadataError(f"{self.token.value:.20} is more than one character")
             self.take()
             value = ord(text or "\0")
         elif self.token.kind == "number":
             value = _integer(self.take().value)
         else:
-            raise self.error(f"expected a number, found {self.token.value!r}")
+            raise MetadataError(f"expected a number, found {self.token.value!r}")
         return -value if negative else value
 
     def text(self) -> str:
         """Take one or more quoted texts, which belong together."""
         if self.token.kind != "text":
-            raise self.error(f"expected a text, found {self.token.value!r}")
+            raise MetadataError(f"expected a text, found {self.token.value!r}")
         value = ""
         while self.token.kind == "text":
             value += _unescaped(self.take().value.lstrip("L")[1:-1])
         return value
-
-    def error(self, message: str) -> MetadataError:
-        """Return an error at this place."""
-        return MetadataError(f"line {self.token.line}: {message}")
 
 
 def _integer(digits: str) -> int:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf import field_types as ctf
-from msgflow.trace.ctf.field_types import BYTE, Reference, Scope
+from msgflow.trace.ctf.field_types import BYTE, MetadataError, Reference, Scope, integer_of
 from msgflow.trace.ctf.tsdl_tokens import TokenStream
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class TypeParser(TokenStream):
         """Parse the structure of a scope, up to its semicolon."""
         declared = self.type_before({";"})
         if not isinstance(declared, ctf.Structure):
-            raise self.error("expected a structure")
+            raise MetadataError("expected a structure")
         return declared
 
     def _specifier(self, ends: set[str] | None = None, one_name_is_left: bool = False) -> ctf.Type:
@@ -112,14 +112,14 @@ class TypeParser(TokenStream):
             if word != "const":
                 words.append(word)
         if not words:
-            raise self.error(f"expected a type, found {self.token.value!r}")
+            raise MetadataError(f"expected a type, found {self.token.value!r}")
         return " ".join(words)
 
     def _find(self, name: str) -> ctf.Type:
         for block in reversed(self._named):
             if name in block:
                 return block[name]
-        raise self.error(f"there is no type {name!r}")
+        raise MetadataError(f"there is no type {name!r}")
 
     def _attributes(self) -> dict[str, Value]:
         values: dict[str, Value] = {}
@@ -142,37 +142,21 @@ class TypeParser(TokenStream):
             return ".".join(words)
         return self.number()
 
-    def _size_of(self, values: Mapping[str, Value], name: str, default: int | None) -> int:
-        value = values.get(name, default)
-        if not isinstance(value, int) or value < 1:
-            raise self.error(f"`{name}` is missing or makes no sense")
-        return value
-
-    def _align_of(self, values: Mapping[str, Value], default: int) -> int:
-        return self._checked_align(self._size_of(values, "align", default))
-
-    def _checked_align(self, align: int) -> int:
-        if align < 1 or align & (align - 1) or align > ctf.MOST_ALIGN:
-            raise self.error(f"an alignment of {align} bits makes no sense")
-        return align
-
     def _is_big_endian(self, values: Mapping[str, Value]) -> bool:
         order = values.get("byte_order", "native")
         if order in {"le", "be", "network"}:
             return order != "le"
         if order != "native":
-            raise self.error(f"there is no byte order {order!r}")
+            raise MetadataError(f"there is no byte order {order!r}")
         return self._big_endian
 
     def _integer(self) -> ctf.Integer:
         values = self._attributes()
-        size = self._size_of(values, "size", None)
-        if size > ctf.MOST_BITS:
-            raise self.error(f"an integer of {size} bits is too large")
+        size = integer_of(values, "size", None)
         encoding = str(values.get("encoding", "none"))
         return ctf.Integer(
             size=size,
-            align=self._align_of(values, 1 if size % BYTE else BYTE),
+            align=integer_of(values, "align", 1 if size % BYTE else BYTE),
             big_endian=self._is_big_endian(values),
             signed=str(values.get("signed", "false")).lower() in {"true", "1"},
             is_text=encoding.lower() in _TEXT_ENCODINGS,
@@ -186,9 +170,8 @@ class TypeParser(TokenStream):
         values = self._attributes()
         digits = (values.get("exp_dig"), values.get("mant_dig"))
         sizes: dict[tuple[Value | None, Value | None], int] = {(8, 24): 32, (11, 53): 64}
-        if digits not in sizes:
-            raise self.error("a floating point number must have 32 or 64 bits")
-        return ctf.Real(sizes[digits], self._align_of(values, 1), self._is_big_endian(values))
+        align = integer_of(values, "align", 1)
+        return ctf.Real(sizes.get(digits, 0), align, self._is_big_endian(values))
 
     def _struct(self) -> ctf.Type:
         name = self.name() if self.token.kind == "name" and self.token.value != "align" else ""
@@ -198,7 +181,7 @@ class TypeParser(TokenStream):
         align = 1
         if self.take_if("align"):
             self.expect("(")
-            align = self._checked_align(self.number())
+            align = self.number()
             self.expect(")")
         structure = ctf.Structure(
             tuple(ctf.Member(without_prefix(key), member) for key, member in members), align
@@ -233,10 +216,7 @@ class TypeParser(TokenStream):
         dimensions: list[int | Reference] = []
         while self.take_if("["):
             if self.token.kind == "number":
-                length = self.number()
-                if length > ctf.MOST_ELEMENTS:
-                    raise self.error(f"an array of {length} elements makes no sense")
-                dimensions.append(length)
+                dimensions.append(self.number())
             else:
                 dimensions.append(reference_of(str(self.value())))
             self.expect("]")
@@ -267,7 +247,7 @@ class TypeParser(TokenStream):
         if selector and isinstance(declared, ctf.Variant):
             return replace(declared, selector=reference_of(selector))
         if self.token.kind == "name":
-            raise self.error(f"the variant {self.token.value!r} has no selector")
+            raise MetadataError(f"the variant {self.token.value!r} has no selector")
         return ctf.Structure()
 
     def _enumeration(self) -> ctf.Type:
@@ -280,7 +260,7 @@ class TypeParser(TokenStream):
         if container is None:
             container = self._find("int")
         if not isinstance(container, ctf.Integer):
-            raise self.error("an enumeration must be of an integer type")
+            raise MetadataError("an enumeration must be of an integer type")
         enumeration = replace(container, labels=self._labels(), is_text=False, base=10)
         if name:
             self._named[-1][f"enum {name}"] = enumeration
