@@ -138,9 +138,7 @@ latency AS (
         count(*) - count(latency_ns) AS stored,
         count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         any_value(sink_event) AS sink_event,
-        min(latency_ns) AS min_ns,
-        quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
-        round(avg(latency_ns))::BIGINT AS mean_ns,
+        main.spread(latency_ns) AS latency,
         -- Of equally long ones the first, and of its arrivals the first.
         max(struct_pack(latency_ns, before_ns := -root_ns, before_take := -take_id))
             FILTER (WHERE latency_ns IS NOT NULL) AS longest
@@ -164,12 +162,7 @@ SELECT
     coalesce(l.pairs, 0) AS pairs,
     coalesce(l.stored, 0) AS stored,
     coalesce(o.number, 0) AS looped,
-    l.min_ns,
-    l.quantiles[1] AS median_ns,
-    l.mean_ns,
-    l.quantiles[2] AS p95_ns,
-    l.quantiles[3] AS p99_ns,
-    l.longest.latency_ns AS max_ns,
+    unnest(l.latency),
     -l.longest.before_ns AS max_root_ns,
     -l.longest.before_take AS max_take_id,
     l.sink_event, p.is_cut, r.reasons, p.path
