@@ -114,20 +114,10 @@ affected AS (
     FROM (SELECT DISTINCT path_id, root_kind, root_id FROM flow WHERE is_loss_affected)
     GROUP BY path_id
 ),
-reason AS (
-    SELECT
-        run_id, path_id,
-        string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
-    FROM (
-        SELECT run_id, path_id, reason, count(*) AS number
-        FROM root
-        WHERE status <> 'reached'
-        GROUP BY run_id, path_id, reason
-    )
-    GROUP BY run_id, path_id
-),
 completeness AS (
-    SELECT run_id, path_id, count(*) AS roots, histogram(status)::MAP(VARCHAR, BIGINT) AS number
+    SELECT
+        run_id, path_id, count(*) AS roots, histogram(status)::MAP(VARCHAR, BIGINT) AS number,
+        main.counts_text(CASE WHEN status <> 'reached' THEN reason END) AS reasons
     FROM root
     GROUP BY run_id, path_id
 ),
@@ -165,11 +155,10 @@ SELECT
     unnest(l.latency),
     -l.longest.before_ns AS max_root_ns,
     -l.longest.before_take AS max_take_id,
-    l.sink_event, p.is_cut, r.reasons, p.path
+    l.sink_event, p.is_cut, c.reasons, p.path
 FROM named_path AS p
 LEFT JOIN completeness AS c ON p.path_id = c.path_id
 LEFT JOIN affected AS a ON p.path_id = a.path_id
 LEFT JOIN latency AS l ON p.path_id = l.path_id
-LEFT JOIN reason AS r ON p.path_id = r.path_id
 LEFT JOIN looped_path AS o ON p.path_id = o.path_id
 ORDER BY p.run_id, p.path, p.path_id
