@@ -56,10 +56,7 @@ measured AS (
         min(period_ns) AS period_min_ns,
         quantile_disc(period_ns, 0.5) AS period_median_ns,
         max(period_ns) AS period_max_ns,
-        min(duration_ns) AS min_ns,
-        quantile_disc(duration_ns, [0.5, 0.95, 0.99]) AS quantiles,
-        round(avg(duration_ns))::BIGINT AS mean_ns,
-        max(duration_ns) AS max_ns,
+        main.spread(duration_ns) AS duration,
         sum(duration_ns)::BIGINT AS total_ns,
         quantile_disc(running_ns, [0.5, 0.99]) AS running,
         quantile_disc(preempted_ns, 0.99) AS preempted_p99_ns,
@@ -75,12 +72,7 @@ SELECT
             )
             THEN (m.count - 1) * 1e9 / nullif(m.span_ns, 0)
     END AS rate_hz,
-    m.period_min_ns, m.period_median_ns, m.period_max_ns, m.min_ns,
-    m.quantiles[1] AS median_ns,
-    m.mean_ns,
-    m.quantiles[2] AS p95_ns,
-    m.quantiles[3] AS p99_ns,
-    m.max_ns, m.total_ns,
+    m.period_min_ns, m.period_median_ns, m.period_max_ns, unnest(m.duration), m.total_ns,
     m.running[1] AS running_median_ns,
     m.running[2] AS running_p99_ns,
     m.preempted_p99_ns, m.preempted_ns, c.symbol, m.callback_id, l.is_internal
@@ -88,4 +80,4 @@ FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 JOIN main.run AS r ON m.run_id = r.run_id
 JOIN main.callback AS c ON m.callback_id = c.callback_id
-ORDER BY m.run_id, p99_ns DESC NULLS LAST, l.node, l.label, m.callback_id
+ORDER BY m.run_id, m.duration.p99_ns DESC NULLS LAST, l.node, l.label, m.callback_id

@@ -6,6 +6,7 @@
 --     have no latency, and are left out.
 -- grain: one row per flow and piece, node or activity
 -- like: e2e-latency
+-- steps: path_chain, path_outcome, named_path
 -- param: from VARCHAR = NULL  Topics or nodes where flows start
 -- param: to
 -- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
@@ -63,22 +64,6 @@
 -- brief: rank, at_ns, duration_ns, share, activity, state, who, node, what, is_certain, pieces,
 --     hop, part, thread, wakers, priority, who_priority
 -- note: clocks
-CREATE OR REPLACE TEMP TABLE path_chain AS
-FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
-
-CREATE OR REPLACE TEMP TABLE path_outcome AS
-SELECT
-    run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
-    reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
-FROM main.end_to_end(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain',
-    has_calls := $has_calls, has_gaps := $has_gaps, has_states := $has_states
-);
-
-CREATE OR REPLACE TEMP TABLE named_path AS
-SELECT run_id, path_id, subscription_id, is_path, is_cut, path, topics, publishers, subscriptions
-FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
-
 CREATE OR REPLACE TEMP TABLE critical_flow AS
 WITH path AS (
     SELECT path_id
@@ -244,41 +229,22 @@ sorted AS (
 ),
 summed AS MATERIALIZED (
     SELECT
-        run_id, flow_rank,
-        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(at_ns) END AS at_ns,
+        run_id, flow_rank, take_id, latency_ns, path_id, row_key,
+        min(position) AS position,
         sum(duration_ns)::BIGINT AS duration_ns,
-        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(hop) END AS hop,
-        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(part) END AS part,
+        round(sum(duration_ns) / nullif(latency_ns, 0), 4) AS share,
+        sum(pieces)::BIGINT AS pieces,
+        $by = 'piece' AND row_key <> 'rest' AS is_piece,
+        CASE WHEN is_piece THEN any_value(struct_pack(
+            at_ns, hop, part, what, who, thread, wakers, priority, who_priority, is_certain,
+            from_ns, callback_instance_id, publication_id
+        )) END AS piece,
         CASE
             WHEN $by = 'piece' AND row_key = 'rest' THEN 'rest'
             WHEN $by <> 'node' THEN any_value(activity)
         END AS activity,
-        CASE
-            WHEN $by = 'node' OR $by = 'piece' AND row_key <> 'rest' THEN any_value(node)
-        END AS node,
-        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(what) END AS what,
-        CASE
-            WHEN $by = 'part' OR $by = 'piece' AND row_key <> 'rest' THEN any_value(state)
-        END AS state,
-        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(who) END AS who,
-        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(thread) END AS thread,
-        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(wakers) END AS wakers,
-        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(priority) END AS priority,
-        CASE
-            WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(who_priority)
-        END AS who_priority,
-        round(sum(duration_ns) / nullif(latency_ns, 0), 4) AS share,
-        sum(pieces)::BIGINT AS pieces,
-        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(is_certain) END AS is_certain,
-        CASE WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(from_ns) END AS from_ns,
-        CASE
-            WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(callback_instance_id)
-        END AS callback_instance_id,
-        CASE
-            WHEN $by = 'piece' AND row_key <> 'rest' THEN any_value(publication_id)
-        END AS publication_id,
-        take_id, latency_ns, path_id, row_key,
-        min(position) AS position
+        CASE WHEN is_piece OR $by = 'node' THEN any_value(node) END AS node,
+        CASE WHEN is_piece OR $by = 'part' THEN any_value(state) END AS state
     FROM sorted
     GROUP BY run_id, flow_rank, take_id, latency_ns, path_id, row_key
 ),
@@ -301,9 +267,10 @@ doubted AS (
     FROM critical_flow
 )
 SELECT
-    s.run_id, s.flow_rank AS rank, s.at_ns, s.duration_ns, s.hop, s.part, s.activity, s.state,
-    s.who, s.node, s.what, s.share, s.pieces, s.is_certain, s.thread, s.wakers, s.priority,
-    s.who_priority, s.from_ns, s.callback_instance_id, s.publication_id, s.take_id, s.latency_ns,
+    s.run_id, s.flow_rank AS rank, s.piece.at_ns, s.duration_ns, s.piece.hop, s.piece.part,
+    s.activity, s.state, s.piece.who, s.node, s.piece.what, s.share, s.pieces, s.piece.is_certain,
+    s.piece.thread, s.piece.wakers, s.piece.priority, s.piece.who_priority, s.piece.from_ns,
+    s.piece.callback_instance_id, s.piece.publication_id, s.take_id, s.latency_ns,
     -- The path of a flow of a thousand hops is long: only the first of its rows has it.
     CASE WHEN s.place = 1 THEN d.is_ambiguous END AS is_ambiguous,
     CASE

@@ -4,14 +4,14 @@
 --     until the next output. Their age right before that is the highest that they reach: the peak
 --     age. The time window applies to outputs.
 -- grain: one row per path
--- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
--- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
+-- like: e2e-latency
+-- steps: path_chain
+-- param: from, to
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that is the input
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that is the
 --     output
--- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
--- column: run_id BIGINT            Run
+-- param: max_depth, max_paths
+-- column: run_id
 -- column: outputs BIGINT           Outputs in the time window
 -- column: loss_affected BIGINT     Outputs with a gap of a trace in the time since their input
 -- column: ambiguous BIGINT         Outputs that pass a link that may be another one (a
@@ -28,13 +28,17 @@
 -- column: time_mean_ns BIGINT [ns]    Mean age over time, from the first output to the last
 -- column: sink_event VARCHAR       Event that is the output: to_event, or 'take' where the sink
 --     never shows a callback
--- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
--- column: path VARCHAR [path]  Nodes and topics
+-- column: is_cut, path
 -- brief: path, outputs, median_ns, p99_ns, max_ns, peak_max_ns, ambiguous, loss_affected, p95_ns,
 --     peak_median_ns, peak_p95_ns, mean_ns
 -- note: clocks
-CREATE OR REPLACE TEMP TABLE path_chain AS
-FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
+
+-- Of the whole recording: the window is one of outputs, or of later inputs.
+CREATE OR REPLACE TEMP TABLE every_outcome AS
+FROM main.end_to_end(
+    $runs, $from, $to, $from_event, $to_event, chains := 'path_chain', has_calls := $has_calls,
+    has_gaps := $has_gaps, has_states := $has_states
+);
 
 WITH output AS (
     SELECT
@@ -42,10 +46,7 @@ WITH output AS (
         sink_ns - root_ns AS age_ns,
         is_loss_affected, is_ambiguous,
         lead(sink_ns) OVER (PARTITION BY path_id ORDER BY sink_ns, take_id) - root_ns AS peak_ns
-    FROM main.end_to_end(
-        $runs, $from, $to, $from_event, $to_event,
-        -9223372036854775807::BIGINT, 9223372036854775807::BIGINT, chains := 'path_chain'
-    )
+    FROM every_outcome
     WHERE status = 'reached' AND is_newest
 ),
 measured AS (
@@ -55,10 +56,7 @@ measured AS (
         count(*) FILTER (WHERE is_loss_affected) AS loss_affected,
         count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         any_value(sink_event) AS sink_event,
-        min(age_ns) AS min_ns,
-        quantile_disc(age_ns, [0.5, 0.95, 0.99]) AS quantiles,
-        round(avg(age_ns))::BIGINT AS mean_ns,
-        max(age_ns) AS max_ns,
+        main.spread(age_ns) AS age,
         quantile_disc(peak_ns, [0.5, 0.95]) AS peaks,
         max(peak_ns) AS peak_max_ns,
         round(
@@ -74,12 +72,7 @@ SELECT
     coalesce(m.outputs, 0) AS outputs,
     coalesce(m.loss_affected, 0) AS loss_affected,
     coalesce(m.ambiguous, 0) AS ambiguous,
-    m.min_ns,
-    m.quantiles[1] AS median_ns,
-    m.mean_ns,
-    m.quantiles[2] AS p95_ns,
-    m.quantiles[3] AS p99_ns,
-    m.max_ns,
+    unnest(m.age),
     m.peaks[1] AS peak_median_ns,
     m.peaks[2] AS peak_p95_ns,
     m.peak_max_ns, m.time_mean_ns, m.sink_event, p.is_cut, p.path

@@ -6,6 +6,7 @@
 --     --to: else there is a row for each two topics between which a path leads.
 -- grain: one row per topic where flows start, topic where they end, and node that takes it
 -- like: e2e-latency
+-- steps: path_chain, path_outcome, named_path
 -- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: first_topic VARCHAR [topic]  Topic of the first message
@@ -56,20 +57,12 @@
 --     not_connected, unknown, cut_by_recording
 -- answer: reached
 -- note: clocks
-CREATE OR REPLACE TEMP TABLE path_chain AS
-FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
-
-CREATE OR REPLACE TEMP TABLE named_path AS
-SELECT run_id, path_id, path, topics[1] AS first_topic, topics[-1] AS last_topic, is_cut
-FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
-
 WITH flow AS (
     SELECT
-        p.path, p.first_topic, p.last_topic, e.run_id, e.root_kind, e.root_id, e.root_ns,
-        e.take_id, e.sink_ns, e.latency_ns, e.status, e.is_loss_affected, e.is_ambiguous
-    FROM main.end_to_end(
-        $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain'
-    ) AS e
+        p.path, p.topics[1] AS first_topic, p.topics[-1] AS last_topic, e.run_id, e.root_kind,
+        e.root_id, e.root_ns, e.take_id, e.sink_ns, e.latency_ns, e.status, e.is_loss_affected,
+        e.is_ambiguous
+    FROM path_outcome AS e
     JOIN named_path AS p ON e.path_id = p.path_id
 ),
 arrival AS MATERIALIZED (
@@ -98,26 +91,21 @@ measured AS (
         count(latency_ns) AS pairs,
         count(take_id) AS arrivals,
         count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
-        min(first_ns) AS first_min_ns,
-        quantile_disc(first_ns, [0.5, 0.95, 0.99]) AS firsts,
-        round(avg(first_ns))::BIGINT AS first_mean_ns,
+        main.spread(first_ns) AS firsts,
         -- Of equally long ones the first, and of its arrivals the first.
         max(struct_pack(latency_ns := first_ns, before_ns := -root_ns, before_take := -take_id))
             FILTER (WHERE first_ns IS NOT NULL) AS longest_first,
-        min(last_ns) AS last_min_ns,
-        quantile_disc(last_ns, [0.5, 0.95, 0.99]) AS lasts,
-        round(avg(last_ns))::BIGINT AS last_mean_ns,
+        main.spread(last_ns) AS lasts,
         max(struct_pack(latency_ns := last_ns, before_ns := -root_ns, before_take := -take_id))
             FILTER (WHERE last_ns IS NOT NULL) AS longest_last,
-        quantile_disc(newest_ns, [0.5, 0.95, 0.99]) AS newests,
-        round(avg(newest_ns))::BIGINT AS newest_mean_ns,
-        max(newest_ns) AS newest_max_ns
+        main.spread(newest_ns) AS newests
     FROM arrival
     GROUP BY run_id, first_topic, last_topic, node
 ),
 ends AS (
     SELECT
-        run_id, first_topic, last_topic, string_split(path, ' → ')[-1] AS node,
+        run_id, topics[1] AS first_topic, topics[-1] AS last_topic,
+        string_split(path, ' → ')[-1] AS node,
         count(*) AS paths, bool_or(is_cut) AS is_cut
     FROM named_path
     GROUP BY ALL
@@ -138,27 +126,27 @@ SELECT
     coalesce(m.messages, 0) AS messages,
     coalesce(m.pairs, 0) AS pairs,
     round(m.arrivals / nullif(m.number['reached'], 0), 2) AS per_root,
-    m.first_min_ns,
-    m.firsts[1] AS first_median_ns,
-    m.first_mean_ns,
-    m.firsts[2] AS first_p95_ns,
-    m.firsts[3] AS first_p99_ns,
-    m.longest_first.latency_ns AS first_max_ns,
+    m.firsts.min_ns AS first_min_ns,
+    m.firsts.median_ns AS first_median_ns,
+    m.firsts.mean_ns AS first_mean_ns,
+    m.firsts.p95_ns AS first_p95_ns,
+    m.firsts.p99_ns AS first_p99_ns,
+    m.firsts.max_ns AS first_max_ns,
     -m.longest_first.before_ns AS first_max_root_ns,
     -m.longest_first.before_take AS first_max_take_id,
-    m.last_min_ns,
-    m.lasts[1] AS last_median_ns,
-    m.last_mean_ns,
-    m.lasts[2] AS last_p95_ns,
-    m.lasts[3] AS last_p99_ns,
-    m.longest_last.latency_ns AS last_max_ns,
+    m.lasts.min_ns AS last_min_ns,
+    m.lasts.median_ns AS last_median_ns,
+    m.lasts.mean_ns AS last_mean_ns,
+    m.lasts.p95_ns AS last_p95_ns,
+    m.lasts.p99_ns AS last_p99_ns,
+    m.lasts.max_ns AS last_max_ns,
     -m.longest_last.before_ns AS last_max_root_ns,
     -m.longest_last.before_take AS last_max_take_id,
-    m.newests[1] AS newest_median_ns,
-    m.newest_mean_ns,
-    m.newests[2] AS newest_p95_ns,
-    m.newests[3] AS newest_p99_ns,
-    m.newest_max_ns, n.is_cut
+    m.newests.median_ns AS newest_median_ns,
+    m.newests.mean_ns AS newest_mean_ns,
+    m.newests.p95_ns AS newest_p95_ns,
+    m.newests.p99_ns AS newest_p99_ns,
+    m.newests.max_ns AS newest_max_ns, n.is_cut
 FROM ends AS n
 LEFT JOIN measured AS m
     ON n.run_id = m.run_id

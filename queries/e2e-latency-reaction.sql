@@ -7,6 +7,7 @@
 --     the later input.
 -- grain: one row per path
 -- like: e2e-latency-age
+-- steps: path_chain, every_outcome
 -- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: inputs BIGINT            Inputs in the time window
@@ -26,9 +27,7 @@
 -- brief: path, inputs, median_ns, p99_ns, max_ns, unanswered, ambiguous, loss_affected, p95_ns,
 --     event_mean_ns, intervals, mean_ns, min_ns
 -- note: clocks
-CREATE OR REPLACE TEMP TABLE path_chain AS
-FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
-
+CREATE OR REPLACE TEMP TABLE answered_input AS
 WITH input AS (
     SELECT
         path_id, root_kind, root_id,
@@ -37,33 +36,29 @@ WITH input AS (
         any_value(sink_event) AS sink_event,
         bool_or(is_loss_affected) AS is_loss_affected,
         arg_min(is_ambiguous, sink_ns) AS is_ambiguous
-    FROM main.end_to_end(
-        $runs, $from, $to, $from_event, $to_event,
-        -9223372036854775807::BIGINT, 9223372036854775807::BIGINT, chains := 'path_chain'
-    )
+    FROM every_outcome
     GROUP BY path_id, root_kind, root_id
-),
-answered AS (
-    SELECT
-        path_id, root_ns, sink_event, is_loss_affected,
-        lag(root_ns) OVER in_time AS previous_ns,
-        min(first_ns) OVER from_here AS answer_ns,
-        arg_min(is_ambiguous, first_ns) OVER from_here AS is_ambiguous
-    FROM input
-    WINDOW
-        in_time AS (PARTITION BY path_id ORDER BY root_ns, root_kind, root_id),
-        from_here AS (
-            PARTITION BY path_id ORDER BY root_ns DESC, root_kind DESC, root_id DESC
-            ROWS UNBOUNDED PRECEDING
-        )
-),
-windowed AS (
+)
+SELECT
+    path_id, root_ns, sink_event, is_loss_affected,
+    lag(root_ns) OVER in_time AS previous_ns,
+    min(first_ns) OVER from_here AS answer_ns,
+    arg_min(is_ambiguous, first_ns) OVER from_here AS is_ambiguous
+FROM input
+WINDOW
+    in_time AS (PARTITION BY path_id ORDER BY root_ns, root_kind, root_id),
+    from_here AS (
+        PARTITION BY path_id ORDER BY root_ns DESC, root_kind DESC, root_id DESC
+        ROWS UNBOUNDED PRECEDING
+    );
+
+WITH windowed AS (
     SELECT
         path_id, sink_event, is_loss_affected, is_ambiguous, answer_ns,
         root_ns - previous_ns AS interval_ns,
         answer_ns - previous_ns AS reaction_ns,
         answer_ns - root_ns AS delay_ns
-    FROM answered
+    FROM answered_input
     WHERE root_ns >= $start_ns AND root_ns < $end_ns
 ),
 measured AS (
@@ -75,10 +70,7 @@ measured AS (
         count(*) FILTER (WHERE is_loss_affected AND reaction_ns IS NOT NULL) AS loss_affected,
         count(*) FILTER (WHERE is_ambiguous AND reaction_ns IS NOT NULL) AS ambiguous,
         any_value(sink_event) AS sink_event,
-        min(reaction_ns) AS min_ns,
-        quantile_disc(reaction_ns, [0.5, 0.95, 0.99]) AS quantiles,
-        round(avg(reaction_ns))::BIGINT AS mean_ns,
-        max(reaction_ns) AS max_ns,
+        main.spread(reaction_ns) AS reaction,
         round(
             sum(interval_ns * ((reaction_ns + delay_ns) / 2.0::DOUBLE))
             / nullif(sum(CASE WHEN reaction_ns IS NOT NULL THEN interval_ns END), 0)
@@ -93,12 +85,7 @@ SELECT
     coalesce(m.unanswered, 0) AS unanswered,
     coalesce(m.loss_affected, 0) AS loss_affected,
     coalesce(m.ambiguous, 0) AS ambiguous,
-    m.min_ns,
-    m.quantiles[1] AS median_ns,
-    m.mean_ns,
-    m.quantiles[2] AS p95_ns,
-    m.quantiles[3] AS p99_ns,
-    m.max_ns, m.event_mean_ns, m.sink_event, p.is_cut, p.path
+    unnest(m.reaction), m.event_mean_ns, m.sink_event, p.is_cut, p.path
 FROM main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p
 LEFT JOIN measured AS m ON p.path_id = m.path_id
 ORDER BY p.run_id, p.path, p.path_id

@@ -7,7 +7,8 @@
 --     newest input of the cycle. CARET measures with --from-event publish --to-event
 --     callback_start.
 -- grain: one row per path and response time
--- like: e2e-latency-age
+-- like: e2e-latency-reaction
+-- steps: path_chain, every_outcome, answered_input
 -- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: response VARCHAR         'all', 'best', 'worst' or 'worst-with-external-latency'
@@ -23,41 +24,14 @@
 -- column: sink_event, is_cut, path
 -- brief: path, response, count, median_ns, p99_ns, max_ns, ambiguous, p95_ns, mean_ns, min_ns
 -- note: clocks
-CREATE OR REPLACE TEMP TABLE path_chain AS
-FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
-
-WITH input AS (
-    SELECT
-        path_id, root_kind, root_id,
-        any_value(root_ns) AS root_ns,
-        min(sink_ns) AS first_ns,
-        any_value(sink_event) AS sink_event,
-        arg_min(is_ambiguous, sink_ns) AS is_ambiguous
-    FROM main.end_to_end(
-        $runs, $from, $to, $from_event, $to_event,
-        -9223372036854775807::BIGINT, 9223372036854775807::BIGINT, chains := 'path_chain'
-    )
-    GROUP BY path_id, root_kind, root_id
-),
-answered AS (
-    SELECT
-        path_id, root_ns, sink_event,
-        min(first_ns) OVER from_here AS answer_ns,
-        arg_min(is_ambiguous, first_ns) OVER from_here AS is_ambiguous
-    FROM input
-    WINDOW from_here AS (
-        PARTITION BY path_id ORDER BY root_ns DESC, root_kind DESC, root_id DESC
-        ROWS UNBOUNDED PRECEDING
-    )
-),
-cycle AS (
+WITH cycle AS (
     SELECT
         path_id, answer_ns,
         min(root_ns) AS oldest_ns,
         max(root_ns) AS newest_ns,
         any_value(sink_event) AS sink_event,
         bool_or(is_ambiguous) AS is_ambiguous
-    FROM answered
+    FROM answered_input
     WHERE answer_ns IS NOT NULL
     GROUP BY path_id, answer_ns
     QUALIFY row_number() OVER (PARTITION BY path_id ORDER BY answer_ns) > 1
@@ -78,7 +52,7 @@ response AS (
     FROM cycle
     UNION ALL
     SELECT a.path_id, a.sink_event, a.is_ambiguous, a.root_ns, 'all', a.answer_ns - a.root_ns
-    FROM answered AS a
+    FROM answered_input AS a
     JOIN cycle AS c ON a.path_id = c.path_id AND a.answer_ns = c.answer_ns
 ),
 measured AS (
@@ -87,21 +61,13 @@ measured AS (
         count(response_ns) AS count,
         count(response_ns) FILTER (WHERE is_ambiguous) AS ambiguous,
         any_value(sink_event) AS sink_event,
-        min(response_ns) AS min_ns,
-        quantile_disc(response_ns, [0.5, 0.95, 0.99]) AS quantiles,
-        round(avg(response_ns))::BIGINT AS mean_ns,
-        max(response_ns) AS max_ns
+        main.spread(response_ns) AS spread
     FROM response
     WHERE input_ns >= $start_ns AND input_ns < $end_ns
     GROUP BY path_id, response
 )
 SELECT
-    p.run_id, m.response, m.count, m.ambiguous, m.min_ns,
-    m.quantiles[1] AS median_ns,
-    m.mean_ns,
-    m.quantiles[2] AS p95_ns,
-    m.quantiles[3] AS p99_ns,
-    m.max_ns, m.sink_event, p.is_cut, p.path
+    p.run_id, m.response, m.count, m.ambiguous, unnest(m.spread), m.sink_event, p.is_cut, p.path
 FROM main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p
 JOIN measured AS m ON p.path_id = m.path_id
 ORDER BY p.run_id, p.path, p.path_id, m.response

@@ -114,20 +114,10 @@ affected AS (
     FROM (SELECT DISTINCT path_id, root_kind, root_id FROM flow WHERE is_loss_affected)
     GROUP BY path_id
 ),
-reason AS (
-    SELECT
-        run_id, path_id,
-        string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
-    FROM (
-        SELECT run_id, path_id, reason, count(*) AS number
-        FROM root
-        WHERE status <> 'reached'
-        GROUP BY run_id, path_id, reason
-    )
-    GROUP BY run_id, path_id
-),
 completeness AS (
-    SELECT run_id, path_id, count(*) AS roots, histogram(status)::MAP(VARCHAR, BIGINT) AS number
+    SELECT
+        run_id, path_id, count(*) AS roots, histogram(status)::MAP(VARCHAR, BIGINT) AS number,
+        main.counts_text(CASE WHEN status <> 'reached' THEN reason END) AS reasons
     FROM root
     GROUP BY run_id, path_id
 ),
@@ -138,9 +128,7 @@ latency AS (
         count(*) - count(latency_ns) AS stored,
         count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         any_value(sink_event) AS sink_event,
-        min(latency_ns) AS min_ns,
-        quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
-        round(avg(latency_ns))::BIGINT AS mean_ns,
+        main.spread(latency_ns) AS latency,
         -- Of equally long ones the first, and of its arrivals the first.
         max(struct_pack(latency_ns, before_ns := -root_ns, before_take := -take_id))
             FILTER (WHERE latency_ns IS NOT NULL) AS longest
@@ -164,19 +152,13 @@ SELECT
     coalesce(l.pairs, 0) AS pairs,
     coalesce(l.stored, 0) AS stored,
     coalesce(o.number, 0) AS looped,
-    l.min_ns,
-    l.quantiles[1] AS median_ns,
-    l.mean_ns,
-    l.quantiles[2] AS p95_ns,
-    l.quantiles[3] AS p99_ns,
-    l.longest.latency_ns AS max_ns,
+    unnest(l.latency),
     -l.longest.before_ns AS max_root_ns,
     -l.longest.before_take AS max_take_id,
-    l.sink_event, p.is_cut, r.reasons, p.path
+    l.sink_event, p.is_cut, c.reasons, p.path
 FROM named_path AS p
 LEFT JOIN completeness AS c ON p.path_id = c.path_id
 LEFT JOIN affected AS a ON p.path_id = a.path_id
 LEFT JOIN latency AS l ON p.path_id = l.path_id
-LEFT JOIN reason AS r ON p.path_id = r.path_id
 LEFT JOIN looped_path AS o ON p.path_id = o.path_id
 ORDER BY p.run_id, p.path, p.path_id

@@ -3,6 +3,7 @@
 --     when the end of the path was reached and how long that took, or why it was not.
 -- grain: one row per path and root, or per pair of root and arrival
 -- like: e2e-latency, main.end_to_end
+-- steps: path_chain, path_outcome, named_path
 -- param: from, to, from_event, to_event, case
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
 -- param: max_paths
@@ -24,22 +25,6 @@
 -- brief: path, root_ns, latency_ns, age_from_stamp_ns, status, reason, is_ambiguous, take_id,
 --     sink_ns, root_id
 -- note: clocks
-CREATE OR REPLACE TEMP TABLE path_chain AS
-FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
-
-CREATE OR REPLACE TEMP TABLE path_outcome AS
-SELECT
-    run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
-    reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
-FROM main.end_to_end(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain',
-    has_calls := $has_calls, has_gaps := $has_gaps, has_states := $has_states
-);
-
-CREATE OR REPLACE TEMP TABLE named_path AS
-SELECT run_id, path_id, subscription_id, is_path, is_cut, path, topics, publishers, subscriptions
-FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
-
 SELECT
     f.run_id, f.root_kind, f.root_id, f.root_ns, f.take_id, f.sink_ns, f.latency_ns, f.status,
     f.reason, f.is_ambiguous, p.is_cut, p.path, m.size_bytes,

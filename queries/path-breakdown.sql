@@ -11,6 +11,7 @@
 --     (overlaps).
 -- grain: one row per path, hop, part, and callback that it belongs to
 -- like: e2e-latency
+-- steps: path_chain, path_outcome, named_path
 -- param: from, to, from_event, to_event, case
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
 -- param: max_paths
@@ -39,22 +40,6 @@
 --     total_ns, flows, overlaps
 -- zero: total_ns
 -- note: clocks
-CREATE OR REPLACE TEMP TABLE path_chain AS
-FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
-
-CREATE OR REPLACE TEMP TABLE path_outcome AS
-SELECT
-    run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
-    reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
-FROM main.end_to_end(
-    $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain',
-    has_calls := $has_calls, has_gaps := $has_gaps, has_states := $has_states
-);
-
-CREATE OR REPLACE TEMP TABLE named_path AS
-SELECT run_id, path_id, subscription_id, is_path, is_cut, path, topics, publishers, subscriptions
-FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
-
 CREATE OR REPLACE TEMP TABLE breakdown_flow AS
 SELECT
     flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,

@@ -87,10 +87,7 @@ measured AS (
         quantile_disc(callback_ns, 0.5) AS callback_median_ns,
         quantile_disc(reply_ns, 0.5) AS reply_median_ns,
         quantile_disc(response_ns, 0.5) AS response_median_ns,
-        min(round_trip_ns) AS min_ns,
-        quantile_disc(round_trip_ns, [0.5, 0.95, 0.99]) AS quantiles,
-        round(avg(round_trip_ns))::BIGINT AS mean_ns,
-        max(round_trip_ns) AS max_ns
+        main.spread(round_trip_ns) AS round_trip
     FROM call
     GROUP BY run_id, service_id, client_id
 )
@@ -101,12 +98,12 @@ SELECT
     main.node_label(cn.full_name, cp.name, cp.pid) AS client,
     m.requests, m.answered, m.not_taken, m.not_answered, m.not_received, m.negative,
     m.request_median_ns, m.wait_median_ns, m.callback_median_ns, m.reply_median_ns,
-    m.response_median_ns, m.min_ns AS round_trip_min_ns,
-    m.quantiles[1] AS round_trip_median_ns,
-    m.mean_ns AS round_trip_mean_ns,
-    m.quantiles[2] AS round_trip_p95_ns,
-    m.quantiles[3] AS round_trip_p99_ns,
-    m.max_ns AS round_trip_max_ns, m.service_id, m.client_id,
+    m.response_median_ns, m.round_trip.min_ns AS round_trip_min_ns,
+    m.round_trip.median_ns AS round_trip_median_ns,
+    m.round_trip.mean_ns AS round_trip_mean_ns,
+    m.round_trip.p95_ns AS round_trip_p95_ns,
+    m.round_trip.p99_ns AS round_trip_p99_ns,
+    m.round_trip.max_ns AS round_trip_max_ns, m.service_id, m.client_id,
     coalesce(s.is_internal, c.is_internal, false) AS is_internal
 FROM measured AS m
 LEFT JOIN main.service AS s ON m.service_id = s.service_id

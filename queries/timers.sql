@@ -142,40 +142,6 @@ delayed AS (
     FROM late AS l
     JOIN asked AS a ON l.callback_id = a.callback_id
     GROUP BY l.callback_id
-),
-ran AS (
-    SELECT
-        callback_id,
-        unnest(meanwhile_callback_ids) AS meanwhile_id,
-        unnest(meanwhile_ns) AS overlap_ns
-    FROM late
-),
-pair AS (
-    SELECT r.callback_id, k.alike_id AS meanwhile_id, sum(r.overlap_ns) AS overlap_ns
-    FROM ran AS r
-    JOIN main.callback_alike AS k ON r.meanwhile_id = k.callback_id
-    GROUP BY r.callback_id, k.alike_id
-),
-ranked AS (
-    SELECT
-        callback_id, meanwhile_id,
-        overlap_ns / sum(overlap_ns) OVER (PARTITION BY callback_id) AS share,
-        row_number() OVER (PARTITION BY callback_id ORDER BY overlap_ns DESC, meanwhile_id) AS place
-    FROM pair
-),
-meanwhile AS (
-    SELECT
-        r.callback_id,
-        string_agg(
-            CASE WHEN o.node = l.node THEN '' ELSE o.node || ' ' END
-            || printf('%s %.0f %%', o.label, 100 * r.share),
-            ', ' ORDER BY r.place
-        ) AS shares
-    FROM ranked AS r
-    JOIN main.callback_label AS l ON r.callback_id = l.callback_id
-    JOIN main.callback_label AS o ON r.meanwhile_id = o.callback_id
-    WHERE r.place <= 3 AND r.share >= 0.005
-    GROUP BY r.callback_id
 )
 SELECT
     a.run_id, n.node, n.label AS callback, a.objects, a.period_ns, u.median_ns AS period_median_ns,
@@ -213,6 +179,6 @@ LEFT JOIN usual AS u ON a.callback_id = u.callback_id
 LEFT JOIN kept AS k ON a.callback_id = k.callback_id
 LEFT JOIN delayed AS d ON a.callback_id = d.callback_id
 LEFT JOIN placed AS g ON a.callback_id = g.callback_id
-LEFT JOIN meanwhile AS m ON a.callback_id = m.callback_id
+LEFT JOIN main.meanwhile_share('late') AS m ON a.callback_id = m.callback_id
 WHERE a.callback_id = a.alike_id
 ORDER BY a.run_id, lateness_p99_ns DESC NULLS LAST, n.node, n.label, a.callback_id

@@ -28,55 +28,36 @@
 -- brief: topic_name, subscriber, delivered, dropped, lost, reasons, not_connected, unknown,
 --     delivered_percent, lost_percent, published, cut_by_recording, orphans, orphan_reasons
 -- answer: delivered, dropped, lost, unknown
-WITH outcome AS (
-    SELECT d.subscription_id, d.status, d.reason, count(*) AS number
+WITH delivery AS (
+    SELECT
+        d.subscription_id, count(*) AS published,
+        histogram(d.status)::MAP(VARCHAR, BIGINT) AS number,
+        main.counts_text(d.reason) AS reasons
     FROM main.stat_delivery AS d
     JOIN main.publication AS b ON d.publication_id = b.publication_id
     WHERE list_contains($runs, d.run_id) AND b.start_ns >= $start_ns AND b.start_ns < $end_ns
-    GROUP BY d.subscription_id, d.status, d.reason
-),
-delivery AS (
-    SELECT
-        subscription_id,
-        sum(number)::BIGINT AS published,
-        sum(CASE WHEN status = 'delivered' THEN number ELSE 0 END)::BIGINT AS delivered,
-        sum(CASE WHEN status = 'dropped' THEN number ELSE 0 END)::BIGINT AS dropped,
-        sum(CASE WHEN status = 'lost' THEN number ELSE 0 END)::BIGINT AS lost,
-        sum(CASE WHEN status = 'not_connected' THEN number ELSE 0 END)::BIGINT AS not_connected,
-        sum(CASE WHEN status = 'cut_by_recording' THEN number ELSE 0 END)::BIGINT
-            AS cut_by_recording,
-        sum(CASE WHEN status = 'unknown' THEN number ELSE 0 END)::BIGINT AS unknown,
-        string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
-    FROM outcome
-    GROUP BY subscription_id
-),
-orphan_outcome AS (
-    SELECT o.subscription_id, o.reason, count(*) AS number
-    FROM main.stat_orphan AS o
-    JOIN main.take AS t ON o.take_id = t.take_id
-    WHERE list_contains($runs, o.run_id) AND t.taken_ns >= $start_ns AND t.taken_ns < $end_ns
-    GROUP BY o.subscription_id, o.reason
+    GROUP BY d.subscription_id
 ),
 orphan AS (
     SELECT
-        subscription_id,
-        sum(number)::BIGINT AS orphans,
-        string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS orphan_reasons
-    FROM orphan_outcome
-    GROUP BY subscription_id
+        o.subscription_id, count(*) AS orphans, main.counts_text(o.reason) AS orphan_reasons
+    FROM main.stat_orphan AS o
+    JOIN main.take AS t ON o.take_id = t.take_id
+    WHERE list_contains($runs, o.run_id) AND t.taken_ns >= $start_ns AND t.taken_ns < $end_ns
+    GROUP BY o.subscription_id
 )
 SELECT
     s.run_id, s.topic_name,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
     coalesce(d.published, 0) AS published,
-    coalesce(d.delivered, 0) AS delivered,
-    coalesce(d.dropped, 0) AS dropped,
-    coalesce(d.lost, 0) AS lost,
-    coalesce(d.not_connected, 0) AS not_connected,
-    coalesce(d.cut_by_recording, 0) AS cut_by_recording,
-    coalesce(d.unknown, 0) AS unknown,
-    100 * d.delivered / nullif(d.delivered + d.dropped + d.lost, 0) AS delivered_percent,
-    100 * d.lost / nullif(d.delivered + d.dropped + d.lost, 0) AS lost_percent,
+    coalesce(d.number['delivered'], 0) AS delivered,
+    coalesce(d.number['dropped'], 0) AS dropped,
+    coalesce(d.number['lost'], 0) AS lost,
+    coalesce(d.number['not_connected'], 0) AS not_connected,
+    coalesce(d.number['cut_by_recording'], 0) AS cut_by_recording,
+    coalesce(d.number['unknown'], 0) AS unknown,
+    100 * delivered / nullif(delivered + dropped + lost, 0) AS delivered_percent,
+    100 * lost / nullif(delivered + dropped + lost, 0) AS lost_percent,
     coalesce(o.orphans, 0) AS orphans,
     d.reasons, o.orphan_reasons, s.subscription_id, s.is_internal
 FROM main.subscription AS s

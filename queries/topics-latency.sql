@@ -48,29 +48,24 @@ measured AS (
         count(stored_ns) AS stored,
         count(*) FILTER (WHERE candidate_count > 1) AS ambiguous,
         count(*) FILTER (WHERE latency_ns < 0) AS negative,
-        min(latency_ns) AS min_ns,
-        quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
-        round(avg(latency_ns))::BIGINT AS mean_ns,
+        main.spread(latency_ns) AS latency,
         round(avg(busy_min_ns) FILTER (WHERE latency_ns IS NOT NULL))::BIGINT AS busy_mean_min_ns,
         round(avg(greatest(busy_min_ns, busy_max_ns)) FILTER (WHERE latency_ns IS NOT NULL))::BIGINT
-            AS busy_mean_max_ns,
-        max(latency_ns) AS max_ns
+            AS busy_mean_max_ns
     FROM received
     GROUP BY run_id, subscription_id
 )
 SELECT
     m.run_id, s.topic_name,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
-    m.takes, m.linked, m.stored, m.ambiguous, m.negative, m.min_ns,
-    m.quantiles[1] AS median_ns,
-    m.mean_ns, m.busy_mean_min_ns, m.busy_mean_max_ns,
-    m.quantiles[2] AS p95_ns,
-    m.quantiles[3] AS p99_ns,
-    m.max_ns, m.subscription_id,
+    m.takes, m.linked, m.stored, m.ambiguous, m.negative, m.latency.min_ns,
+    m.latency.median_ns, m.latency.mean_ns, m.busy_mean_min_ns, m.busy_mean_max_ns,
+    m.latency.p95_ns, m.latency.p99_ns, m.latency.max_ns, m.subscription_id,
     coalesce(s.is_internal, false) AS is_internal
 FROM measured AS m
 LEFT JOIN main.subscription AS s ON m.subscription_id = s.subscription_id
 LEFT JOIN main.process AS p ON s.process_id = p.process_id
 LEFT JOIN main.node AS n ON s.node_id = n.node_id
 ORDER BY
-    m.run_id, p99_ns DESC NULLS LAST, s.topic_name NULLS LAST, subscriber, m.subscription_id
+    m.run_id, m.latency.p99_ns DESC NULLS LAST, s.topic_name NULLS LAST, subscriber,
+    m.subscription_id

@@ -72,27 +72,15 @@ jitter AS (
     FROM deviation
     GROUP BY run_id, topic_name
 ),
-outcome AS (
-    SELECT s.run_id, s.topic_name, d.status, d.reason, count(*) AS number
+delivery AS (
+    SELECT
+        s.run_id, s.topic_name, histogram(d.status)::MAP(VARCHAR, BIGINT) AS number,
+        main.counts_text(d.reason) AS reasons
     FROM main.stat_delivery AS d
     JOIN main.publication AS b ON d.publication_id = b.publication_id
     JOIN main.subscription AS s ON d.subscription_id = s.subscription_id
     WHERE list_contains($runs, d.run_id) AND b.start_ns >= $start_ns AND b.start_ns < $end_ns
-    GROUP BY s.run_id, s.topic_name, d.status, d.reason
-),
-delivery AS (
-    SELECT
-        run_id, topic_name,
-        sum(CASE WHEN status = 'delivered' THEN number ELSE 0 END)::BIGINT AS delivered,
-        sum(CASE WHEN status = 'dropped' THEN number ELSE 0 END)::BIGINT AS dropped,
-        sum(CASE WHEN status = 'lost' THEN number ELSE 0 END)::BIGINT AS lost,
-        sum(CASE WHEN status = 'not_connected' THEN number ELSE 0 END)::BIGINT AS not_connected,
-        sum(CASE WHEN status = 'cut_by_recording' THEN number ELSE 0 END)::BIGINT
-            AS cut_by_recording,
-        sum(CASE WHEN status = 'unknown' THEN number ELSE 0 END)::BIGINT AS unknown,
-        string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
-    FROM outcome
-    GROUP BY run_id, topic_name
+    GROUP BY s.run_id, s.topic_name
 ),
 latency AS (
     SELECT
@@ -112,12 +100,12 @@ SELECT
     t.run_id, t.topic_name, t.publisher_count, t.subscription_count,
     coalesce(r.number, 0) AS publication_count,
     r.rate_hz, r.period_median_ns, j.period_deviation_ns,
-    coalesce(d.delivered, 0) AS delivered,
-    coalesce(d.dropped, 0) AS dropped,
-    coalesce(d.lost, 0) AS lost,
-    coalesce(d.not_connected, 0) AS not_connected,
-    coalesce(d.cut_by_recording, 0) AS cut_by_recording,
-    coalesce(d.unknown, 0) AS unknown,
+    coalesce(d.number['delivered'], 0) AS delivered,
+    coalesce(d.number['dropped'], 0) AS dropped,
+    coalesce(d.number['lost'], 0) AS lost,
+    coalesce(d.number['not_connected'], 0) AS not_connected,
+    coalesce(d.number['cut_by_recording'], 0) AS cut_by_recording,
+    coalesce(d.number['unknown'], 0) AS unknown,
     d.reasons,
     l.quantiles[1] AS latency_median_ns,
     l.quantiles[2] AS latency_p95_ns,

@@ -5,7 +5,9 @@
 --     of an executor that ran the other callback at once count once, but for thread_max. Where the
 --     kernel was traced, what had the CPU while the thread waited for one has rows of its own.
 -- grain: one row per waiting callback and callback that ran meanwhile, or thread that had the CPU
--- column: run_id BIGINT             Run
+-- like: path-breakdown
+-- steps: exact_arrival
+-- column: run_id
 -- column: node VARCHAR [node]  Node of the callback that waited
 -- column: callback VARCHAR [callback]  What triggers it
 -- column: meanwhile_node VARCHAR [node]  Node of the callback that ran
@@ -24,14 +26,6 @@
 -- column: is_internal BOOLEAN       The callback that waited is infrastructure of ROS
 -- brief: node, meanwhile_node, worst_ns, share, meanwhile_thread, callback, meanwhile_callback,
 --     waits, overlap_max_ns, overlap_min_ns, instances
-
--- when: main.thread_state, main.data_arrival
--- columns: take_id BIGINT, until_arrival_ns BIGINT, run_queue_ns BIGINT, executor_ns BIGINT
-CREATE OR REPLACE TEMP TABLE exact_arrival AS
-SELECT take_id, until_arrival_ns, run_queue_ns, executor_ns
-FROM main.arrival
-WHERE list_contains($runs, run_id) AND is_exact AND executor_ns IS NOT NULL;
-
 CREATE OR REPLACE TEMP TABLE explained_wait AS
 SELECT
     run_id, callback_instance_id, executor_id, callback_id, start_ns, busy_min_ns, busy_max_ns,

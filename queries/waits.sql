@@ -83,42 +83,6 @@ measured AS (
     FROM waited
     GROUP BY run_id, callback_id
 ),
-ran AS (
-    SELECT
-        callback_id,
-        unnest(meanwhile_callback_ids) AS meanwhile_id,
-        unnest(meanwhile_ns) AS overlap_ns
-    FROM waited
-),
-pair AS (
-    SELECT r.callback_id, k.alike_id AS meanwhile_id, sum(r.overlap_ns) AS overlap_ns
-    FROM ran AS r
-    JOIN main.callback_alike AS k ON r.meanwhile_id = k.callback_id
-    GROUP BY r.callback_id, k.alike_id
-),
-ranked AS (
-    SELECT
-        p.callback_id, p.meanwhile_id,
-        p.overlap_ns / sum(p.overlap_ns) OVER (PARTITION BY p.callback_id) AS share,
-        row_number() OVER (
-            PARTITION BY p.callback_id ORDER BY p.overlap_ns DESC, p.meanwhile_id
-        ) AS place
-    FROM pair AS p
-),
-meanwhile AS (
-    SELECT
-        r.callback_id,
-        string_agg(
-            CASE WHEN o.node = l.node THEN '' ELSE o.node || ' ' END
-            || printf('%s %.0f %%', o.label, 100 * r.share),
-            ', ' ORDER BY r.place
-        ) AS shares
-    FROM ranked AS r
-    JOIN main.callback_label AS l ON r.callback_id = l.callback_id
-    JOIN main.callback_label AS o ON r.meanwhile_id = o.callback_id
-    WHERE r.place <= 3 AND r.share >= 0.005
-    GROUP BY r.callback_id
-),
 taken AS (
     SELECT callback_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns FROM waited
 ),
@@ -147,6 +111,6 @@ SELECT
     l.is_internal
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
-LEFT JOIN meanwhile AS w ON m.callback_id = w.callback_id
+LEFT JOIN main.meanwhile_share('waited') AS w ON m.callback_id = w.callback_id
 LEFT JOIN preemptor AS p ON m.callback_id = p.callback_id
 ORDER BY m.run_id, m.busy_worst_ns DESC NULLS LAST, l.node, l.label, m.callback_id

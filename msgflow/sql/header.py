@@ -19,6 +19,7 @@
     -- variant: measure VARCHAR {latency|age} = 'latency'  What is measured
     -- like: main.end_to_end, main.flow_path
     -- column: run_id, path_id, root_ns
+    -- steps: path_chain
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
 The name of the object is that of its file; below `schema/` the schema that the objects of its
@@ -48,6 +49,7 @@ folder are in stands before. Only what others put in front of theirs says its ki
 
 - `like`: other files of the folder, of `schema/public` (main.NAME) or `queries` (queries.NAME). A
   `param` or a `column` may be a list of names: the first of these files that has it declares it.
+- `steps`: tables that the files of `like` make. A query makes them first, and then its own.
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
   A query may have several: each value of them is one file.
@@ -109,6 +111,7 @@ _REPEATABLE = ("param", "column", "variant")
 _SINGLE = (
     "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when",
     "also", "unites", "brief", "answer", "heading", "slowest", "zero", "like",
+    "steps",
 )  # fmt: skip
 _MACRO = re.compile(r"(?:--[^\n]*\n|\s)*CREATE (?:OR REPLACE )?MACRO ")
 # The schema of the database that the objects of a folder of `schema/` are in.
@@ -278,6 +281,11 @@ def parse(text: str, path: Path) -> Header:
     params = tuple(_params(fields, like, path))
     variants = tuple(_param(field, path) for field in fields if field.key == "variant")
     columns = tuple(_columns(fields, like, path))
+    shared = {step.table: step for header in reversed(like) for step in header.steps}
+    for table in _names(single.get("steps", "")):
+        if table not in shared:
+            raise _error(path, 1, f"nothing makes this table — {table}")
+    steps = (*(shared[table] for table in _names(single.get("steps", ""))), *steps)
     _check_names(params, path)
     _check_names(columns, path)
     for key in ("brief", "answer", "heading", "slowest", "zero"):

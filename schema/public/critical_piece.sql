@@ -299,8 +299,8 @@ occupied AS (
 -- The message whose callback published for what lay in the cache, or the timer that did.
 completing AS (
     SELECT
-        w.position, b.publication_id, b.start_ns AS published_ns, b.end_ns, t.taken_ns,
-        i.callback_instance_id, s.callback_instance_id AS publishing_id,
+        w.position, w.from_ns, w.to_ns, b.publication_id, b.start_ns AS published_ns, b.end_ns,
+        t.taken_ns, i.callback_instance_id, s.callback_instance_id AS publishing_id,
         s.start_ns AS publishing_ns
     FROM waiting AS w
     JOIN main.callback_instance AS i ON w.callback_instance_id = i.callback_instance_id
@@ -345,27 +345,25 @@ candidate AS (
         AND i.is_bounded
         AND i.back_ns - i.away_ns >= 1_000_000
     UNION ALL
-    SELECT c.position, 6, 'unpublished', w.from_ns, coalesce(c.publishing_ns, c.published_ns),
-        NULL, c.publishing_id, c.publication_id
-    FROM completing AS c
-    JOIN waiting AS w ON c.position = w.position
-    UNION ALL
-    SELECT position, 6, 'callback', publishing_ns, published_ns, NULL, publishing_id, publication_id
-    FROM completing
-    WHERE publishing_ns IS NOT NULL
-    UNION ALL
-    SELECT position, 6, 'publish', published_ns, end_ns, NULL, publishing_id, publication_id
-    FROM completing
-    UNION ALL
-    SELECT
-        position, 6, 'network_or_idle', end_ns, taken_ns, NULL, callback_instance_id,
-        publication_id
-    FROM completing
-    UNION ALL
-    SELECT c.position, 6, 'take_to_callback', c.taken_ns, w.to_ns, NULL, c.callback_instance_id,
-        c.publication_id
-    FROM completing AS c
-    JOIN waiting AS w ON c.position = w.position
+    SELECT position, 6, activity, begin_ns, until_ns, NULL, worker_id, publication_id
+    FROM (
+        SELECT
+            position, publication_id,
+            unnest([
+                {'activity': 'unpublished', 'begin_ns': from_ns,
+                    'until_ns': coalesce(publishing_ns, published_ns), 'worker_id': publishing_id},
+                {'activity': 'callback', 'begin_ns': publishing_ns, 'until_ns': published_ns,
+                    'worker_id': publishing_id},
+                {'activity': 'publish', 'begin_ns': published_ns, 'until_ns': end_ns,
+                    'worker_id': publishing_id},
+                {'activity': 'network_or_idle', 'begin_ns': end_ns, 'until_ns': taken_ns,
+                    'worker_id': callback_instance_id},
+                {'activity': 'take_to_callback', 'begin_ns': taken_ns, 'until_ns': to_ns,
+                    'worker_id': callback_instance_id}
+            ], recursive := true)
+        FROM completing
+    )
+    WHERE begin_ns IS NOT NULL
 ),
 named AS (
     SELECT

@@ -136,60 +136,44 @@ cached AS (
     LEFT JOIN callback AS s ON d.callback_instance_id = s.callback_instance_id
     WHERE derive.is_indirect(c.kind)
 ),
--- The moments at which a part begins. Those of a hop are in the order of `rank`.
-detour AS (
-    SELECT
-        publication_id, entered_id, -5 * level AS rank, 'request_to_take' AS part, sent_ns AS at_ns,
-        callback_instance_id, callback_id, busy_min_ns, busy_max_ns, NULL::BIGINT AS about_id
-    FROM call
-    WHERE sent_ns IS NOT NULL AND (taken_ns IS NOT NULL OR callback_instance_id IS NOT NULL)
-    UNION ALL
-    SELECT
-        publication_id, entered_id, 1 - 5 * level, 'take_to_callback', taken_ns,
-        callback_instance_id, callback_id, NULL, NULL, NULL
-    FROM call
-    WHERE taken_ns IS NOT NULL AND callback_instance_id IS NOT NULL
-    UNION ALL
-    SELECT
-        publication_id, entered_id, 2 - 5 * level, 'service', start_ns, callback_instance_id,
-        callback_id, NULL, NULL, NULL
-    FROM call
-    UNION ALL
-    SELECT
-        publication_id, entered_id, 3 - 5 * level, 'response_to_take', answered_ns, NULL, NULL,
-        NULL, NULL, NULL
-    FROM call
-    WHERE answered_ns IS NOT NULL
-    UNION ALL
-    SELECT
-        publication_id, entered_id, 4 - 5 * level, 'callback', returned_ns, NULL, NULL, NULL, NULL,
-        NULL
-    FROM call
-    WHERE returned_ns IS NOT NULL
-    UNION ALL
-    SELECT
-        publication_id, entered_id, 0, 'cache', stored_ns, callback_instance_id, callback_id, NULL,
-        NULL, publication_id
-    FROM cached
-    UNION ALL
-    SELECT
-        publication_id, entered_id, 1, 'callback', start_ns, callback_instance_id, callback_id,
-        NULL, NULL, NULL
-    FROM cached
-    WHERE callback_instance_id IS NOT NULL
-),
+-- The moments at which a part begins, in the order of causes. A cache comes after all calls.
 between AS MATERIALIZED (
     SELECT
         publication_id, entered_id,
-        list(
-            {
-                'at_ns': at_ns, 'rank': rank, 'part': part,
-                'callback_instance_id': callback_instance_id, 'callback_id': callback_id,
-                'busy_min_ns': busy_min_ns, 'busy_max_ns': busy_max_ns, 'publication_id': about_id
-            }
-            ORDER BY rank
+        list_filter(
+            flatten(list(moments ORDER BY level DESC)), lambda moment: moment.at_ns IS NOT NULL
         ) AS moments
-    FROM detour
+    FROM (
+        SELECT
+            publication_id, entered_id, level,
+            [
+                derive.moment(
+                    'request_to_take',
+                    CASE WHEN taken_ns IS NOT NULL OR callback_instance_id IS NOT NULL
+                        THEN sent_ns END,
+                    NULL, callback_instance_id, callback_id, busy_min_ns, busy_max_ns
+                ),
+                derive.moment(
+                    'take_to_callback',
+                    CASE WHEN callback_instance_id IS NOT NULL THEN taken_ns END, NULL,
+                    callback_instance_id, callback_id
+                ),
+                derive.moment('service', start_ns, NULL, callback_instance_id, callback_id),
+                derive.moment('response_to_take', answered_ns),
+                derive.moment('callback', returned_ns)
+            ] AS moments
+        FROM call
+        UNION ALL
+        SELECT
+            publication_id, entered_id, 0,
+            [
+                derive.moment(
+                    'cache', stored_ns, publication_id, callback_instance_id, callback_id
+                ),
+                derive.moment('callback', start_ns, NULL, callback_instance_id, callback_id)
+            ]
+        FROM cached
+    )
     GROUP BY publication_id, entered_id
 ),
 turn AS MATERIALIZED (
@@ -211,14 +195,15 @@ message AS (
         i.callback_id, i.busy_min_ns, i.busy_max_ns,
         b.start_ns, b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns,
         coalesce(b.end_ns, f.root_ns) AS end_ns,
-        least(b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns) AS layer_ns,
+        -- Where the first layer of publishing is not known.
+        b.start_ns IS DISTINCT FROM least(b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns)
+            AS is_vague,
         -- No event shows when the last layer ends, unless the publication has a later one: the
         -- message is written after it.
-        (b.intra_ns IS NOT NULL)::INTEGER + (b.rclcpp_ns IS NOT NULL)::INTEGER
-        + (b.rcl_ns IS NOT NULL)::INTEGER + (b.rmw_ns IS NOT NULL)::INTEGER
-        + (b.dds_ns IS NOT NULL)::INTEGER - coalesce(
-            greatest(b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns) >= b.end_ns, false
-        )::INTEGER AS layer_count,
+        len(list_filter(
+            [b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns],
+            lambda layer_ns: layer_ns < b.end_ns
+        )) AS layer_count,
         h.hop > 1 OR f.root_kind = 'callback_instance' AS is_entered,
         CASE WHEN h.hop = 1 THEN f.root_ns ELSE coalesce(p.start_ns, u.taken_ns) END AS entered_ns,
         CASE WHEN h.hop = 1 THEN f.root_id ELSE p.callback_instance_id END AS entered_id,
@@ -240,122 +225,84 @@ message AS (
     LEFT JOIN (FROM turn WHERE has_turns) AS w ON h.flow_id = w.flow_id AND h.hop = w.hop
     LEFT JOIN derive.stored_take AS z ON h.take_id = z.take_id
 ),
--- `lead` is the number of its parts before the layers of publishing, `place` that of all parts of
--- the flow before it.
-counted AS (
+-- A list of all parts would be most of the memory of what is sorted here: it comes behind.
+placed AS (
     SELECT
         *,
-        -- Where the first layer of publishing is not known.
-        start_ns IS DISTINCT FROM layer_ns AS is_vague,
-        is_entered::INTEGER + len(turn) + (start_ns IS DISTINCT FROM layer_ns)::INTEGER AS lead,
-        -- How many parts come before the time up to the take.
-        lead + layer_count + (subscribed_ns IS NOT NULL)::INTEGER AS before_take
-    FROM message
-),
-placed AS MATERIALIZED (
-    SELECT
-        *,
-        (sum(before_take + 1 + is_called::INTEGER) OVER (PARTITION BY flow_id ORDER BY hop))
-        ::BIGINT - (before_take + 1 + is_called::INTEGER) AS place
-    FROM counted
+        -- How many parts of its flow come before.
+        (sum(parts) OVER (PARTITION BY flow_id ORDER BY hop))::BIGINT - parts AS place
+    FROM (
+        SELECT
+            *,
+            is_entered::INTEGER + len(turn) + is_vague::INTEGER + layer_count
+            + (subscribed_ns IS NOT NULL)::INTEGER + 1 + is_called::INTEGER AS parts
+        FROM message
+    )
 ),
 -- The layers follow each other in time, everything else in the order of causes.
-layer AS (
+begun AS (
     SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, lead, turn,
-        publication_id, intra_ns, rclcpp_ns, rcl_ns, rmw_ns, dds_ns, end_ns, slot,
-        CASE slot
-            WHEN 1 THEN intra_ns
-            WHEN 2 THEN rclcpp_ns
-            WHEN 3 THEN rcl_ns
-            WHEN 4 THEN rmw_ns
-            ELSE dds_ns
-        END AS at_ns
-    FROM (SELECT *, unnest(range(1, 6)) AS slot FROM placed)
+        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, parts,
+        len(turn) > 0 AS is_turning,
+        list_filter(
+            [
+                derive.moment(
+                    'callback', CASE WHEN is_entered THEN entered_ns END, NULL, entered_id,
+                    entered_callback_id
+                )
+            ]
+            || turn
+            || [derive.moment('publish', CASE WHEN is_vague THEN start_ns END, publication_id)]
+            || list_sort(list_filter(
+                [
+                    derive.moment('intra', intra_ns, publication_id),
+                    derive.moment('rclcpp', rclcpp_ns, publication_id),
+                    derive.moment('rcl', rcl_ns, publication_id),
+                    derive.moment('rmw', rmw_ns, publication_id),
+                    derive.moment('dds', dds_ns, publication_id)
+                ],
+                lambda layer: layer.at_ns < end_ns
+            ))
+            || [
+                derive.moment(
+                    'stored', CASE WHEN subscribed_ns IS NOT NULL THEN end_ns END, publication_id
+                ),
+                derive.moment(
+                    'publish_to_take', coalesce(subscribed_ns, end_ns), publication_id,
+                    callback_instance_id, callback_id, busy_min_ns, busy_max_ns
+                ),
+                derive.moment(
+                    'take_to_callback', CASE WHEN is_called THEN taken_ns END, publication_id,
+                    callback_instance_id, callback_id
+                ),
+                derive.moment(
+                    'callback', CASE WHEN is_finished THEN called_ns END, NULL,
+                    callback_instance_id, callback_id
+                )
+            ],
+            lambda moment: moment.at_ns IS NOT NULL
+        ) AS moments,
+        CASE WHEN is_finished THEN sink_ns WHEN is_called THEN called_ns ELSE taken_ns END
+            AS until_ns
+    FROM placed
 ),
-every_part AS (
+part AS (
     SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
-        ['intra', 'rclcpp', 'rcl', 'rmw', 'dds'][slot] AS part,
-        -- Of its layers, how many come before.
-        lead + 1
-        + coalesce((intra_ns < at_ns OR intra_ns = at_ns AND slot > 1)::INTEGER, 0)
-        + coalesce((rclcpp_ns < at_ns OR rclcpp_ns = at_ns AND slot > 2)::INTEGER, 0)
-        + coalesce((rcl_ns < at_ns OR rcl_ns = at_ns AND slot > 3)::INTEGER, 0)
-        + coalesce((rmw_ns < at_ns OR rmw_ns = at_ns AND slot > 4)::INTEGER, 0)
-        + coalesce((dds_ns < at_ns)::INTEGER, 0) AS rank,
-        at_ns AS from_ns,
-        coalesce(
-            least(
-                CASE WHEN intra_ns > at_ns THEN intra_ns END,
-                CASE WHEN rclcpp_ns > at_ns OR rclcpp_ns = at_ns AND slot < 2 THEN rclcpp_ns END,
-                CASE WHEN rcl_ns > at_ns OR rcl_ns = at_ns AND slot < 3 THEN rcl_ns END,
-                CASE WHEN rmw_ns > at_ns OR rmw_ns = at_ns AND slot < 4 THEN rmw_ns END,
-                CASE WHEN dds_ns > at_ns OR dds_ns = at_ns AND slot < 5 THEN dds_ns END
-            ),
-            CASE WHEN end_ns > at_ns THEN end_ns END
-        ) AS to_ns,
-        NULL::BIGINT AS callback_instance_id,
-        NULL::BIGINT AS callback_id,
-        NULL::BIGINT AS busy_min_ns,
-        NULL::BIGINT AS busy_max_ns,
-        publication_id
-    FROM layer
-    WHERE to_ns IS NOT NULL
-    UNION ALL
-    SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
-        'callback', 1, entered_ns, coalesce(turn[1].at_ns, start_ns), entered_id,
-        entered_callback_id, NULL, NULL, NULL
-    FROM placed
-    WHERE is_entered
-    UNION ALL
-    SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
-        turn[slot].part, is_entered::INTEGER + slot, turn[slot].at_ns,
-        coalesce(turn[slot + 1].at_ns, start_ns), turn[slot].callback_instance_id,
-        turn[slot].callback_id, turn[slot].busy_min_ns, turn[slot].busy_max_ns,
-        turn[slot].publication_id
-    FROM (SELECT *, unnest(range(1, len(turn) + 1)) AS slot FROM placed WHERE len(turn) > 0)
-    UNION ALL
-    SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
-        'publish', lead, start_ns, coalesce(layer_ns, end_ns), NULL, NULL, NULL, NULL,
-        publication_id
-    FROM placed
-    WHERE is_vague
-    UNION ALL
-    SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
-        'stored', lead + layer_count + 1, end_ns, subscribed_ns, NULL, NULL, NULL, NULL,
-        publication_id
-    FROM placed
-    WHERE subscribed_ns IS NOT NULL
-    UNION ALL
-    SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
-        'publish_to_take', before_take + 1, coalesce(subscribed_ns, end_ns), taken_ns,
-        callback_instance_id, callback_id, busy_min_ns, busy_max_ns, publication_id
-    FROM placed
-    UNION ALL
-    SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, turn,
-        'take_to_callback', before_take + 2, taken_ns, called_ns, callback_instance_id,
-        callback_id, NULL, NULL, publication_id
-    FROM placed
-    WHERE is_called
-    UNION ALL
-    SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop + 1,
-        place + before_take + 1 + is_called::INTEGER, [],
-        'callback', 1, called_ns, sink_ns, callback_instance_id, callback_id, NULL, NULL, NULL
-    FROM placed
-    WHERE is_finished
+        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, parts,
+        is_turning, until_ns, unnest(moments) AS moment, unnest(moments[2:] || [NULL]) AS next,
+        unnest(range(1, len(moments) + 1)) AS number
+    FROM begun
 )
+-- The callback at the end of a flow is a hop of its own.
 SELECT
-    run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop,
-    place + rank AS position, rank::BIGINT AS rank, part, from_ns, to_ns,
+    run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns,
+    hop + (number > parts)::INTEGER AS hop,
+    place + number AS position,
+    CASE WHEN number > parts THEN 1 ELSE number END AS rank,
+    moment.part, moment.at_ns AS from_ns,
+    coalesce(next.at_ns, until_ns) AS to_ns,
     to_ns - from_ns AS duration_ns,
-    callback_instance_id, publication_id, callback_id, busy_min_ns, busy_max_ns,
-    len(turn) > 0 AS is_turning
-FROM every_part
+    moment.callback_instance_id, moment.publication_id, moment.callback_id, moment.busy_min_ns,
+    moment.busy_max_ns,
+    is_turning AND number <= parts AS is_turning
+FROM part

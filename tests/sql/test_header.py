@@ -169,6 +169,17 @@ def test_names_alone_are_declared_by_the_first_file_that_has_them(tmp_path: Path
     assert [column.description for column in header.columns] == ["Of a", "Of b", ""]
 
 
+def test_steps_of_another_file_come_first(tmp_path: Path) -> None:
+    head, step = "-- description: x\n", "CREATE OR REPLACE TEMP TABLE {} AS\nSELECT 1;\n\n"
+    made = "".join(map(step.format, ("first", "other")))
+    (tmp_path / "a.sql").write_text(f"{head}{made}SELECT 1\n")
+    text = f"{head}-- like: a\n-- steps: first\n{step.format('own')}SELECT 1\n"
+    header = parse(text, tmp_path / "x.sql")
+    assert [made.table for made in header.steps] == ["first", "own"]
+    with pytest.raises(HeaderError, match="nothing makes this table — last"):
+        parse(text.replace("steps: first", "steps: last"), tmp_path / "x.sql")
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -23,18 +23,20 @@ WITH span AS (
 place AS MATERIALIZED (
     SELECT DISTINCT
         b.node, b.what, b.path, b.part, b.p95_ns, e.p95_ns AS path_ns,
-        s.length_ns / nullif(e.roots, 0) AS period_ns, s.has_kernel
+        s.length_ns / nullif(e.roots, 0) AS period_ns, s.has_kernel,
+        (b.node, b.what) IN (
+            SELECT (node, label) FROM main.callback_label WHERE list_contains($runs, run_id)
+            UNION ALL
+            SELECT (node, label) FROM why_callback
+        ) AS is_traced
     FROM breakdown AS b
     JOIN path_row AS e ON b.path = e.path AND b.run_id = e.run_id
     JOIN span AS s ON b.run_id = s.run_id
     -- Below 0 where clocks are apart: nobody makes such a path late.
     WHERE (e.p95_ns > 0) IS NOT FALSE
 ),
--- A short window may have no instance of one.
-traced AS (
-    SELECT node, label FROM main.callback_label WHERE list_contains($runs, run_id)
-    UNION ALL
-    SELECT node, label FROM why_callback
+way AS MATERIALIZED (
+    SELECT DISTINCT path, path_ns, string_split(path, ' → ') AS steps FROM place
 ),
 callback AS MATERIALIZED (
     SELECT
@@ -68,7 +70,7 @@ computing AS (
     -- Callbacks that are not traced: from a take to what is published.
     SELECT node, what, path, path_ns, 20_000_000, false, NULL, p95_ns, 0, false
     FROM place
-    WHERE part = 'callback' AND (node, what) NOT IN (SELECT (node, label) FROM traced)
+    WHERE part = 'callback' AND NOT is_traced
 ),
 other AS (
     SELECT
@@ -138,9 +140,9 @@ failed AS (
         f.queue_depth, w.in_hz, w.out_hz, p.path, p.path_ns
     FROM failing AS f
     JOIN flowing AS w ON f.subscription_id = w.subscription_id
-    JOIN (SELECT DISTINCT path, path_ns FROM place) AS p
-        ON list_contains(string_split(p.path, ' → '), f.subscriber)
-        AND list_contains(string_split(p.path, ' → '), coalesce(f.topic_name, '?'))
+    JOIN way AS p
+        ON list_contains(p.steps, f.subscriber)
+        AND list_contains(p.steps, coalesce(f.topic_name, '?'))
 ),
 created AS (
     SELECT
@@ -156,8 +158,7 @@ late AS (
         (c.created_ns - c.usual_ns)::BIGINT AS cost_ns,
         d.missed, d.topic_name, d.published
     FROM created AS c
-    JOIN (SELECT DISTINCT path, path_ns FROM place) AS p
-        ON list_contains(string_split(p.path, ' → '), c.full_name)
+    JOIN way AS p ON list_contains(p.steps, c.full_name)
     LEFT JOIN (
         SELECT
             subscriber, sum(published) AS published, string_agg(topic_name, ', ') AS topic_name,
@@ -203,8 +204,7 @@ sampled AS (
         printf('%s and wait for up to %s', k.inputs, main.duration_text(k.period_ns)),
         k.period_ns >= 20_000_000
     FROM kept AS k
-    JOIN (SELECT DISTINCT path, path_ns FROM place) AS p
-        ON ends_with(p.path, ' → ' || k.topic_name || ' → ' || k.node)
+    JOIN way AS p ON ends_with(p.path, ' → ' || k.topic_name || ' → ' || k.node)
 ),
 -- Executors of several threads that look for work again and again.
 awake AS (
@@ -240,7 +240,7 @@ moving AS (
     -- Where no callbacks are traced.
     SELECT what, path, path_ns, has_kernel, false, node, p95_ns
     FROM place
-    WHERE part = 'undecided' AND (node, what) NOT IN (SELECT (node, label) FROM traced)
+    WHERE part = 'undecided' AND NOT is_traced
 )
 SELECT
     'callback' AS kind, node AS who, label AS what, path, cost_ns,
@@ -269,16 +269,12 @@ SELECT
     o.other_label, o.path, o.other_ns,
     o.other_ns >= o.limit_ns AND o.other_ns >= 0.1 * o.path_ns,
     CASE
-        WHEN h.is_calling
+        WHEN h.is_calling OR o.likely_server IS NOT NULL
             THEN printf(
-                'its service %s, for which %s waits (%s),', h.service_name, o.other_label,
-                main.duration_text(h.run_ns)
-            )
-        WHEN o.likely_server IS NOT NULL
-            THEN printf(
-                'its service %s, for which %s waits (%s) as far as times show (requests are'
-                || ' recorded since Kilted),',
-                o.likely_service, o.other_label, main.duration_text(h.run_ns)
+                'its service %s, for which %s waits (%s)%s,',
+                CASE WHEN h.is_calling THEN h.service_name ELSE o.likely_service END,
+                o.other_label, main.duration_text(h.run_ns),
+                CASE WHEN h.is_calling THEN '' ELSE ' as far as times show' END
             )
         ELSE printf('its callback %s (%s)', o.other_label, main.duration_text(h.run_ns))
     END

@@ -88,7 +88,7 @@ computed AS (
         quantile_disc(i.end_ns - i.start_ns - s.preempted_ns - s.runnable_ns, 0.95) AS computed_ns
     FROM main.callback_schedule AS s
     JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
-    WHERE i.callback_id IN (SELECT other_id FROM meanwhile)
+    WHERE $has_kernel AND i.callback_id IN (SELECT other_id FROM meanwhile)
         AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
     GROUP BY i.callback_id
 ),

@@ -1,0 +1,14 @@
+-- description: The words of a group, each with how often it occurs, the most frequent first:
+--     'a 3, b 1'. NULL where there is none.
+-- param: word VARCHAR  Words of a group; NULL does not count
+CREATE OR REPLACE MACRO main.counts_text(word) AS
+nullif(array_to_string(
+    list_transform(
+        list_sort(list_transform(
+            map_entries(histogram(word)),
+            lambda entry: {'rest': -entry.value::BIGINT, 'word': entry.key}
+        )),
+        lambda entry: entry.word || ' ' || -entry.rest
+    ),
+    ', '
+), '')
