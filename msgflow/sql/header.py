@@ -333,10 +333,9 @@ def relations_of(text: str) -> frozenset[str]:
 
 
 def _split(text: str, path: Path) -> tuple[list[_Field], str]:
-    head = _HEAD.match(text)
-    assert head is not None
+    body = _HEAD.sub("", text, count=1)
     fields: list[_Field] = []
-    for number, line in enumerate(head[0].splitlines(), start=1):
+    for number, line in enumerate(text[: len(text) - len(body)].splitlines(), start=1):
         if continuation := _CONTINUATION.fullmatch(line.rstrip()):
             if not fields:
                 raise _error(path, number, "the header starts with a continuation line")
@@ -356,7 +355,7 @@ def _split(text: str, path: Path) -> tuple[list[_Field], str]:
             )
     if not fields:
         raise _error(path, 1, "there is no header")
-    return fields, text[head.end() :].strip("\n") + "\n"
+    return fields, body.strip("\n") + "\n"
 
 
 def _steps(body: str) -> tuple[tuple[Step, ...], str]:
