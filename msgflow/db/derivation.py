@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from msgflow.db import objects
 from msgflow.db.finding import kinds_of, store_findings
 from msgflow.db.store_table import store_tables
-from msgflow.sql.statement import RECORDED, recorded
+from msgflow.sql.statement import RECORDED, recorded, with_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable
 
     import duckdb
 
@@ -67,9 +67,7 @@ def derive_from_clocks(
 def derive_findings(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """Find anew what a recording shows, inside the open transaction."""
     kinds = kinds_of("recording")
-    # Each source is asked once, for all kinds that name it.
-    sources = dict.fromkeys(source for kind in kinds for source in kind.sources)
-    filled = {source for source in sources if _has_row(con, source, run_id)}
+    filled = _with_rows(con, {source for kind in kinds for source in kind.sources}, run_id)
     found = [kind for kind in kinds if not kind.sources or filled.intersection(kind.sources)]
     store_findings(con, run_id, found)
 
@@ -119,26 +117,28 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
     whole = _header(f"derive.{name}")
     for header in (whole, *map(_header, whole.also)):
         if _may_have_rows(con, header, run_id):
-            parts = [part for part in RECORDED if f"{part} := true" in header.body]
-            con.execute(
+            text = (
                 f"INSERT INTO store.{name} ({columns}) {_united(con, header, run_id)}"
-                f"SELECT {columns} FROM {_of_run(header.name, parts)}",
-                {"run_id": run_id, **recorded(con, parts)},
+                f"SELECT {columns} FROM {_of_run(header.name)}"
             )
+            parts = [part for part in RECORDED if f"${part}" in text]
+            con.execute(text, {"run_id": run_id, **recorded(con, parts)})
 
 
 def _may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> bool:
     """Tell whether an object may have rows of a run, as the `when` of its header says."""
-    return not header.sources or any(_has_row(con, source, run_id) for source in header.sources)
+    return not header.sources or bool(_with_rows(con, header.sources, run_id))
 
 
-def _has_row(con: duckdb.DuckDBPyConnection, source: tuple[str, str], run_id: int) -> bool:
-    """Tell whether a table, view or macro has a row of a run for which a condition holds."""
-    name, condition = source
-    rows = f"SELECT 1 FROM {_of_run(name)} LIMIT 1"
-    if condition:
-        rows = f"SELECT 1 FROM {_of_run(name)} AND ({condition}) LIMIT 1"
-    return bool(con.execute(rows, {"run_id": run_id}).fetchall())
+def _with_rows(
+    con: duckdb.DuckDBPyConnection, sources: Iterable[tuple[str, str]], run_id: int
+) -> set[tuple[str, str]]:
+    """Return which tables, views or macros have a row of a run for which their condition holds."""
+    rows = {
+        (name, condition): _of_run(name) + (f" AND ({condition})" if condition else "")
+        for name, condition in sources
+    }
+    return with_rows(con, rows, {"run_id": run_id})
 
 
 def _united(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> str:
@@ -150,16 +150,14 @@ def _united(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> str:
     return f"WITH united AS MATERIALIZED ({rows}) "
 
 
-def _of_run(name: str, parts: Sequence[str] = ()) -> str:
-    """Return what follows FROM for the rows of the run `$run_id`.
-
-    `parts` are the parameters of a macro among RECORDED.
-    """
+def _of_run(name: str) -> str:
+    """Return what follows FROM for the rows of the run `$run_id`."""
     if name.startswith("store.") or _header(name).kind == "view":
         return f"{name} WHERE run_id = $run_id"
-    words = ["'united'"] if _header(name).unites else []
-    words += ["$run_id", *(f"{part} := ${part}" for part in parts)]
-    return f"{name}({', '.join(words)})"
+    header = _header(name)
+    words = ["'united'"] if header.unites else []
+    parts = (f"{part} := ${part}" for part in RECORDED if f"{part} := true" in header.body)
+    return f"{name}({', '.join([*words, '$run_id', *parts])})"
 
 
 @cache

@@ -49,7 +49,7 @@ def load(layer: str) -> tuple[Header, ...]:
     directory = resource_directory("schema") / layer
     if not directory.is_dir():
         raise FileNotFoundError(directory)
-    headers = [read(path) for path in sorted(directory.rglob("*.sql"))]
+    headers = [read(path) for path in directory.rglob("*.sql")]
     if layer == PUBLIC:
         headers = [*map(completed, headers), *table_views()]
     return sort([*headers, *composed(layer)])

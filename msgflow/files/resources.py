@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 
+@cache
 def resource_directory(name: str) -> Path:
     """Return the directory `name` ('schema', 'migrations', 'queries', or 'docs' with the cookbook).
 

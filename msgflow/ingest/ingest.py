@@ -188,6 +188,7 @@ def ingest(
                         replaced,
                         (declared, clocks),
                         keep_staging,
+                        event_count,
                         watch,
                         interrupts,
                     ),
@@ -222,12 +223,14 @@ def _write(
     replaced: frozenset[int],
     given: tuple[LinksFile | None, ClockSync],
     keep_staging: Path | None,
+    event_count: int,
     watch: _Watch,
     interrupts: Interrupts,
 ) -> tuple[int, str, tuple[Finding, ...]]:
     watch.enter("building the model")
     with staging.writing(con):
-        model.build(con, keep=keep_staging is not None)
+        is_small = event_count < staging.ROWS_PER_INSERT  # to drop them would free next to nothing
+        model.build(con, keep=is_small or keep_staging is not None)
     if target.is_new:
         migration.create(target.path)
         attach(con, target.path, is_new=True)

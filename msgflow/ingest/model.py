@@ -19,6 +19,7 @@ from msgflow.files.resources import resource_directory
 from msgflow.ingest import staging
 from msgflow.ingest.caret_initialisation import restore
 from msgflow.ingest.catalogue import load
+from msgflow.sql.statement import with_rows
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -65,8 +66,12 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
     `empty` names the tables that exist and have no row. This function keeps it up to date.
     """
     if header.name == _FINDING:
-        kinds = [kind for kind in kinds_of("input") if may_have_rows(con, kind, empty)]
-        header = replace(header, body=statement(kinds))
+        kinds = kinds_of("input")
+        sources = {source for kind in kinds for source in kind.sources if source[0] not in empty}
+        rows = {source: f"{source[0]} WHERE {source[1] or 'true'}" for source in sources}
+        filled = with_rows(con, rows, {})
+        found = [kind for kind in kinds if not kind.sources or filled.intersection(kind.sources)]
+        header = replace(header, body=statement(found))
     if header.kind == "macro":
         con.execute(header.body)
     elif header.kind == "inline":

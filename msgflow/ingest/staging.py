@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING
 
+from msgflow.db.transaction import transaction
 from msgflow.errors import UsageError
 from msgflow.files.atomic_directory import replacing_entries
 from msgflow.files.resources import resource_directory
@@ -45,8 +46,9 @@ def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
         # Staged tables are of no use after a crash.
         con.execute(f"ATTACH {literal(path)} AS {name} (RECOVERY_MODE no_wal_writes)")
     catalogue = load()
-    for each in catalogue.staged.values():
-        con.execute(each.create_table_sql("raw", catalogue))
+    with transaction(con):  # a commit after each would take longer than the table
+        for each in catalogue.staged.values():
+            con.execute(each.create_table_sql("raw", catalogue))
     text = (resource_directory("schema") / "staging.sql").read_text(encoding="utf-8")
     # One by one: what looks at a statement before it runs, such as EXPLAIN, sees it.
     for statement in con.extract_statements(text):

@@ -28,6 +28,11 @@ RECORDED = {
     "has_gaps": "EXISTS (FROM store.gap)",
     "has_pauses": "EXISTS (FROM store.gap WHERE kind = 'pause')",
     "has_steps": "EXISTS (FROM store.stamp_clock)",
+    "has_unnamed": "EXISTS (FROM store.publisher WHERE topic_name IS NULL OR is_topic_learned)"
+    " OR EXISTS (FROM store.subscription WHERE topic_name IS NULL OR is_topic_learned)",
+    "has_clocks": "(SELECT count(*) > 1 FROM store.clock)",
+    "has_open_callbacks": "EXISTS (FROM store.callback_instance WHERE end_ns IS NULL)",
+    "has_orphans": "EXISTS (FROM store.orphan_take)",
     "has_failed_takes": "EXISTS (FROM store.failed_take)",
     "has_states": "EXISTS (FROM store.lifecycle_transition)",
 }
@@ -128,13 +133,18 @@ def may_have_rows(
     values: Mapping[str, Any],
 ) -> bool:
     """Tell whether a source of a header or step has a row. Without sources the answer is yes."""
-    found = [f"EXISTS (FROM {name} WHERE {condition or 'true'})" for name, condition in sources]
-    if not found:
-        return True
-    (statement,) = connection.extract_statements(f"SELECT {' OR '.join(found)}")
-    bound = {key: values[key] for key in statement.named_parameters}
-    ((answer,),) = connection.execute(statement, bound).fetchall()
-    return bool(answer)
+    rows = {source: f"{source[0]} WHERE {source[1] or 'true'}" for source in sources}
+    return not rows or bool(with_rows(connection, rows, values))
+
+
+def with_rows(
+    connection: duckdb.DuckDBPyConnection, rows: Mapping[Any, str], values: Mapping[str, Any]
+) -> set[Any]:
+    """Return the sources that have a row, of which `rows` says what follows FROM."""
+    parts = (f"(SELECT {place} FROM {each} LIMIT 1)" for place, each in enumerate(rows.values()))
+    text = " UNION ALL ".join(parts) or "SELECT 0 WHERE false"
+    bound = {key: values[key] for key in connection.extract_statements(text)[0].named_parameters}
+    return {list(rows)[place] for (place,) in connection.execute(text, bound).fetchall()}
 
 
 @contextmanager

@@ -11,7 +11,11 @@
 --     stamp, but a number, which only a publisher can have given to them.
 -- grain: one row per take whose publication is not known
 -- when: derive.unlinked_take
-CREATE OR REPLACE MACRO derive.orphan_take(only_run) AS TABLE
+-- param: has_gaps BOOLEAN = true  The recording has gaps; false: none is looked up
+-- param: has_pauses BOOLEAN = true  Likewise pauses
+CREATE OR REPLACE MACRO derive.orphan_take(
+    only_run, has_gaps := true, has_pauses := true
+) AS TABLE
 WITH orphan AS MATERIALIZED (
     SELECT
         t.take_id, t.subscription_id, t.process_id, t.method, t.taken_ns, t.is_loss_affected,
@@ -28,7 +32,7 @@ presence AS MATERIALIZED (
 ),
 gap AS MATERIALIZED (
     SELECT process_id, start_ns, covered_until_ns
-    FROM derive.process_gap(only_run)
+    FROM derive.process_gap(only_run, has_gaps, has_pauses)
     WHERE EXISTS (SELECT 1 FROM orphan)
 ),
 run_begin AS (

@@ -19,15 +19,19 @@
 -- param: has_pauses BOOLEAN = true  Likewise pauses
 -- param: has_steps BOOLEAN = true  A clock was set; false: no step is looked up
 -- param: has_failed_takes BOOLEAN = true  Takes failed; false: none is looked up
+-- param: has_orphans BOOLEAN = true  Takes have no publication; false: none is looked up
+-- param: has_clocks BOOLEAN = true  There are several clocks; false: all times are of one
+-- param: has_open_callbacks BOOLEAN = true  Callbacks have no end; false: none is looked up
 CREATE OR REPLACE MACRO derive.undelivered(
-    only_run, has_gaps := true, has_pauses := true, has_steps := true, has_failed_takes := true
+    only_run, has_gaps := true, has_pauses := true, has_steps := true, has_failed_takes := true,
+    has_orphans := true, has_clocks := true, has_open_callbacks := true
 ) AS TABLE
 WITH arrival AS MATERIALIZED (
     SELECT
         publication_id, publisher_id, topic_name, clock_id, source_timestamp_ns, arrival_ns,
         has_one_clock
     FROM derive.expected_arrival
-    WHERE run_id = only_run
+    WHERE run_id = only_run AND (has_clocks OR has_one_clock)
 ),
 life AS MATERIALIZED (
     SELECT
@@ -120,13 +124,15 @@ earliest AS (
     GROUP BY subscription_id, publisher_id
 ),
 -- Takes that could be any message, and those that could be one without a stamp.
-unidentified AS MATERIALIZED (
+unidentified AS (
     SELECT
         t.take_id, t.subscription_id, t.taken_ns, t.source_timestamp_ns IS NULL AS has_no_stamp,
         t.method = 'ring_buffer' AS is_from_buffer
-    FROM store.take AS t
-    ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id
-    WHERE t.run_id = only_run AND t.subscription_id IN (SELECT subscription_id FROM missing)
+    FROM store.orphan_take AS o
+    JOIN store.take AS t ON o.take_id = t.take_id
+    WHERE has_orphans
+        AND o.run_id = only_run
+        AND t.subscription_id IN (SELECT subscription_id FROM missing)
 ),
 -- The first that may be of a message from before: a stamp would identify one that was kept. Before
 -- Iron only the callback tells what comes from a buffer.
@@ -168,7 +174,7 @@ kept_waiting AS (
     SELECT s.subscription_id
     FROM life AS s
     JOIN derive.hanging_callback AS c ON s.only_thread_id = c.thread_id
-    WHERE c.run_id = only_run
+    WHERE has_open_callbacks AND c.run_id = only_run
 ),
 -- While a clock is set, no take shows which message it is of.
 while_set AS MATERIALIZED (

@@ -48,6 +48,7 @@ def test_each_table_is_derived_after_those_that_it_reads() -> None:
         ("link_transport", "nearest_message"),
         ("orphan_take", "link_transport"),
         ("undelivered", "link_transport"),
+        ("undelivered", "orphan_take"),
         ("flow_call", "link_causal"),
         ("flow_root", "flow_call"),
         ("flow_hop", "flow_root"),

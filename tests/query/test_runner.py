@@ -619,30 +619,46 @@ def test_all_that_a_recording_may_lack_is_known(small_database: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("table", "kind", "threads", "facts"),
+    ("table", "rows", "facts"),
     [
-        ("store.thread_state", "", 0, {"has_kernel"}),
-        ("store.request", "", 0, {"has_calls"}),
-        ("store.flow_call", "", 0, {"has_turns"}),
-        ("store.link_causal", "direct", 0, set()),
-        ("store.link_causal", "queue", 0, {"has_turns"}),
-        ("derive.executor_size", "", 1, set()),
-        ("derive.executor_size", "", 2, {"has_teams"}),
-        ("store.gap", "loss", 0, {"has_gaps"}),
-        ("store.gap", "pause", 0, {"has_gaps", "has_pauses"}),
-        ("store.stamp_clock", "", 0, {"has_steps"}),
-        ("store.failed_take", "", 0, {"has_failed_takes"}),
-        ("store.lifecycle_transition", "", 0, {"has_states"}),
+        ("store.thread_state", [{}], {"has_kernel"}),
+        ("store.request", [{}], {"has_calls"}),
+        ("store.flow_call", [{}], {"has_turns"}),
+        ("store.link_causal", [{"kind": "direct"}], set()),
+        ("store.link_causal", [{"kind": "queue"}], {"has_turns"}),
+        ("derive.executor_size", [{"thread_count": 1}], set()),
+        ("derive.executor_size", [{"thread_count": 2}], {"has_teams"}),
+        ("store.gap", [{"kind": "loss"}], {"has_gaps"}),
+        ("store.gap", [{"kind": "pause"}], {"has_gaps", "has_pauses"}),
+        ("store.stamp_clock", [{}], {"has_steps"}),
+        ("store.publisher", [{"topic_name": "/a", "is_topic_learned": False}], set()),
+        ("store.publisher", [{"is_topic_learned": False}], {"has_unnamed"}),
+        ("store.publisher", [{"topic_name": "/a", "is_topic_learned": True}], {"has_unnamed"}),
+        ("store.subscription", [{"topic_name": "/a", "is_topic_learned": False}], set()),
+        ("store.subscription", [{"is_topic_learned": False}], {"has_unnamed"}),
+        ("store.subscription", [{"topic_name": "/a", "is_topic_learned": True}], {"has_unnamed"}),
+        ("store.clock", [{}], set()),
+        ("store.clock", [{}, {}], {"has_clocks"}),
+        ("store.callback_instance", [{"end_ns": 1}], set()),
+        ("store.callback_instance", [{}], {"has_open_callbacks"}),
+        ("store.orphan_take", [{}], {"has_orphans"}),
+        ("store.failed_take", [{}], {"has_failed_takes"}),
+        ("store.lifecycle_transition", [{}], {"has_states"}),
     ],
 )
 def test_what_a_recording_has_follows_from_rows(
-    table: str, kind: str, threads: int, facts: set[str]
+    table: str, rows: list[dict[str, object]], facts: set[str]
 ) -> None:
     tables = {name for text in RECORDED.values() for name in re.findall(r"FROM (\S+?)[ )]", text)}
     assert table in tables
     with duckdb.connect() as con:
         con.execute("CREATE SCHEMA store; CREATE SCHEMA derive")
         for name in tables:
-            con.execute(f"CREATE TABLE {name} (kind VARCHAR, thread_count BIGINT)")
-        con.execute(f"INSERT INTO {table} VALUES (?, ?)", [kind, threads])
+            con.execute(
+                f"CREATE TABLE {name} (kind VARCHAR, thread_count BIGINT, topic_name VARCHAR, "
+                "is_topic_learned BOOLEAN, end_ns BIGINT)"
+            )
+        for row in rows:
+            values = ["kind", "thread_count", "topic_name", "is_topic_learned", "end_ns"]
+            con.execute(f"INSERT INTO {table} VALUES (?, ?, ?, ?, ?)", [*map(row.get, values)])
         assert {name for name, has in recorded(con).items() if has} == facts

@@ -35,6 +35,10 @@ CREATE TABLE store.link_transport (run_id BIGINT DEFAULT 1, publication_id BIGIN
 CREATE TABLE store.take (run_id BIGINT DEFAULT 1, take_id BIGINT,
     subscription_id BIGINT DEFAULT 1, taken_ns BIGINT, source_timestamp_ns BIGINT DEFAULT 1,
     method VARCHAR DEFAULT 'rmw');
+CREATE VIEW store.orphan_take AS
+    SELECT t.run_id, t.take_id
+    FROM store.take AS t
+    ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id;
 CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, publication_id BIGINT,
     publisher_id BIGINT, process_id BIGINT DEFAULT 1, thread_id BIGINT, end_ns BIGINT);
 CREATE TABLE store.process (process_id BIGINT, host_id BIGINT);

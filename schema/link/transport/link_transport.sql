@@ -12,7 +12,8 @@
 -- unites: derive.link_transport_exact, derive.link_transport_nearest,
 --     derive.link_transport_ring_buffer, derive.link_transport_agnocast
 -- param: links VARCHAR  Name of the rows of all methods
-CREATE OR REPLACE MACRO derive.link_transport(links, only_run) AS TABLE
+-- param: has_gaps BOOLEAN = true  The recording has gaps; false: none is looked up
+CREATE OR REPLACE MACRO derive.link_transport(links, only_run, has_gaps := true) AS TABLE
 WITH link AS (
     SELECT
         run_id, publication_id, take_id, publisher_id, subscription_id, method, candidate_count,
@@ -45,6 +46,7 @@ guess AS (
     ) AS t ON l.take_id = t.take_id
     JOIN store.process AS tp ON t.process_id = tp.process_id
     JOIN store.host AS th ON tp.host_id = th.host_id
+    WHERE has_gaps
 ),
 gap AS NOT MATERIALIZED (
     SELECT recording_id, start_ns, covered_until_ns

@@ -7,11 +7,12 @@
 --     than publications, some publications were lost, and each take may be of one of those. Equal
 --     values need no clocks: a take may seem to come before its publication.
 -- grain: one row per take whose publication is known by its stamp
-CREATE OR REPLACE MACRO derive.link_transport_exact(only_run) AS TABLE
+-- param: has_unnamed BOOLEAN = true  Some topic is not known; false: none is looked for
+CREATE OR REPLACE MACRO derive.link_transport_exact(only_run, has_unnamed := true) AS TABLE
 WITH unnamed AS (
     SELECT kind, id, 'group ' || group_id AS topic_name
     FROM derive.topic_group(only_run)
-    WHERE topic_name IS NULL
+    WHERE has_unnamed AND topic_name IS NULL
 ),
 published AS (
     SELECT
