@@ -12,6 +12,11 @@ HAS_BT2 := $(BIN)/python -c 'from msgflow.trace.bt2_library import load; load()'
 HAS_LTTNG := { command -v lttng-sessiond && command -v gcc && gcc -E -include lttng/tracepoint.h -xc /dev/null; } >/dev/null 2>&1
 HAS_CHROMIUM := PYTHONPATH=tests/support $(BIN)/python -c 'from browser import find_browser; exit(not find_browser())'
 
+# Python compiles a module when it is first imported. To compile all that is installed, of which most
+# is never imported, takes longer than the rest of an installation.
+PIP := $(BIN)/python -m pip
+INSTALL := install --quiet --no-compile
+
 # Shell function: apt_install PACKAGE...; fails where apt is missing or not allowed.
 APT := apt_install() { \
 	command -v apt-get >/dev/null 2>&1 || return 1; \
@@ -92,7 +97,7 @@ mutants: $(VENV)/.developed
 	$(BIN)/python benchmarks/mutants.py
 
 docs: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --group docs
+	$(PIP) $(INSTALL) --group docs
 	$(BIN)/zensical build --clean
 
 $(VENV)/.made:
@@ -103,20 +108,20 @@ $(VENV)/.made:
 	@$(APT); $(PYTHON) -m venv $(VENV) 2>/dev/null \
 		|| { rm -rf $(VENV); apt_install python3-venv; $(PYTHON) -m venv $(VENV); }
 	@# The group of development packages needs a pip of 2025.
-	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(PIP) $(INSTALL) --upgrade 'pip>=25.1'
 	@touch $@
 
 $(VENV)/.installed: pyproject.toml $(VENV)/.made
-	$(BIN)/python -m pip install --quiet --editable .
+	$(PIP) $(INSTALL) --editable .
 	@touch $@
 
 # The same, with the simulator.
 $(VENV)/.simulates: simulator/pyproject.toml $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --editable simulator
+	$(PIP) $(INSTALL) --editable simulator
 	@touch $@
 
 $(VENV)/.developed: pyproject.toml simulator/pyproject.toml $(VENV)/.made
-	$(BIN)/python -m pip install --quiet --editable . --editable simulator --group dev
+	$(PIP) $(INSTALL) --editable . --editable simulator --group dev
 	@touch $(VENV)/.installed $(VENV)/.simulates $@
 
 babeltrace:
@@ -134,9 +139,9 @@ chromium:
 ros: $(VENV)/.made
 	@$(HAS_LTTNG) || { $(APT); apt_install lttng-tools liblttng-ust-dev gcc libc6-dev || true; }
 	@command -v perf >/dev/null || { $(APT); apt_install linux-perf || true; }
-	@test $(VENV)/ros/.installed -nt pyproject.toml || { $(BIN)/python -m venv --clear $(VENV)/ros \
-		&& $(VENV)/ros/bin/python -m pip install --quiet --upgrade 'pip>=25.1' \
-		&& $(VENV)/ros/bin/python -m pip install --quiet --group ros \
+	@test $(VENV)/ros/.installed -nt pyproject.toml || { \
+		$(BIN)/python -m venv --clear --without-pip $(VENV)/ros \
+		&& $(PIP) --python $(VENV)/ros/bin/python $(INSTALL) --group ros \
 		&& touch $(VENV)/ros/.installed; } \
 		|| echo "note: no rclpy: the tests with real ROS 2 are skipped" >&2
 

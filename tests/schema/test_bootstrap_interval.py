@@ -73,7 +73,7 @@ def test_twenty_resamples_have_to_lie_beyond_the_ends(con: duckdb.DuckDBPyConnec
     ("number", "block_length", "narrowing", "drawn"),
     [
         thorough(1_000, 1, 1, 1_000, id="all"),
-        pytest.param(1_250, 1, sqrt(0.8), 1_000, id="no more than a thousand"),
+        pytest.param(1_250, 10, sqrt(0.8), 1_000, id="no more than a thousand"),
         thorough(2_600, 260, 1, 870, id="ten blocks, of each every third"),
     ],
 )

@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 
 import duckdb
 import pytest
+import thorough
 from browser import ARGUMENTS, find_browser
 from ingested import made_once
 from served import Page, Served
@@ -19,8 +20,16 @@ from served import Page, Served
 from msgflow.database import open_db
 from msgflow.db.connection import connect
 from msgflow.ingest import ingest
+from msgflow.view import pages as view_pages
 from msgflow.view import report as view_report
 from msgflow_sim import simulate
+
+
+@pytest.fixture(autouse=True)
+def _one_flow_taken_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each summary: every other one is a query more, that shows the same of another path."""
+    if thorough.is_quick:
+        monkeypatch.setattr(view_pages, "MOST_PATHS", 1)
 
 
 @pytest.fixture(scope="session")

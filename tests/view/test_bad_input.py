@@ -11,6 +11,7 @@ from typing import Any
 
 import duckdb
 import pytest
+from golden import SYSTEMS, fill_case
 from hostile import HOSTILE, renamed
 from served import Page, Served
 from thorough import few, thorough
@@ -64,9 +65,23 @@ def shown_as(way: str, path: Path, page: Page, **options: Any) -> Iterator[str]:
         server.close()
 
 
+@pytest.fixture
+def calling(fresh_database: Path) -> Path:
+    """A timer, topics and services that call each other, of which all is soon shown."""
+    with duckdb.connect(str(fresh_database)) as connection:
+        fill_case(connection, SYSTEMS / "nested_services.case")
+        connection.execute("UPDATE store.run SET start_ns = 1000, end_ns = 2000")
+    return fresh_database
+
+
 @pytest.mark.parametrize(
     ("way", "shown"),
-    [("file", "demo"), thorough("file", "systems"), thorough("served", "systems")],
+    [
+        ("file", "calling"),
+        thorough("file", "demo"),
+        thorough("file", "systems"),
+        thorough("served", "systems"),
+    ],
 )
 def test_names_are_only_ever_text(
     way: str,

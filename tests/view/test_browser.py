@@ -466,6 +466,11 @@ def test_no_tab_is_out_of_sight_on_a_phone(demo: Path, report: Report, page: Pag
     boxes = [tab.bounding_box() for tab in tabs.all()]
     assert len(boxes) == 6
     assert all(box and box["x"] >= 0 and box["x"] + box["width"] <= 390 for box in boxes)
+    # On a narrow screen, a long name of a run moves nothing but itself.
+    page.page.set_viewport_size({"width": 800, "height": 844})
+    first, second = (page.page.locator(one).bounding_box() for one in (".theme", "nav .tabs"))
+    assert first["y"] + first["height"] <= second["y"]
+    assert second["height"] < 2 * first["height"]
 
 
 @pytest.mark.thorough

@@ -301,10 +301,27 @@ def test_compare_overlays_a_path(systems: Path, report: Report, page: Page) -> N
     assert "B: autoware" in labels
 
 
+@pytest.fixture
+def runs(small_database: Path) -> Path:
+    """Three runs of one node each: that of the first is another than that of the others."""
+    with duckdb.connect(str(small_database)) as connection:
+        connection.execute("UPDATE store.node SET full_name = '/listener' WHERE run_id = 1")
+        for table, own in (
+            ("run", "'evening' AS name"),
+            ("trace", "3 AS trace_id"),
+            ("node", "3 AS node_id"),
+        ):
+            connection.execute(
+                f"INSERT INTO store.{table} BY NAME SELECT * REPLACE (3 AS run_id, {own}) "
+                f"FROM store.{table} WHERE run_id = 2"
+            )
+    return small_database
+
+
 def test_compare_opens_on_the_run_before_and_the_selector_follows(
-    systems: Path, serve: Serve, page: Page
+    runs: Path, serve: Serve, page: Page
 ) -> None:
-    page.open(serve(systems).address)
+    page.open(serve(runs).address)
     choice, other = page.page.get_by_label("run", exact=True), "run to compare with"
     assert choice.input_value() == "3"
     # The comparison itself does not come.

@@ -190,7 +190,11 @@ def test_the_first_page_of_a_report_has_it(
     blame = section(dropping, "blame").result.table.to_pylist()
     page.page.locator(".blame-nodes").first.wait_for(timeout=60_000)
     nodes = page.page.locator(".blame-nodes .numbers").all_inner_texts()
-    assert [each.split(" · ")[0] for each in nodes] == [shown(row["duration_ns"]) for row in blame]
+    shares = [row["duration_ns"] / row["latency_ns"] for row in blame]
+    assert [each.split(" · ") for each in nodes] == [
+        [shown(row["duration_ns"]), "< 0.1 %" if 0 < share < 0.0005 else f"{100 * share:.1f} %"]
+        for row, share in zip(blame, shares, strict=True)
+    ]
     drops = page.page.get_by_role("region", name="What was dropped or lost, and why")
     assert drops.locator("tbody tr").count() == len(section(dropping, "drops").result)
     # What makes data late comes first, and each finding is a line.

@@ -9,6 +9,7 @@ import pyarrow as pa
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tables import decoded
+from thorough import examples
 
 from msgflow.view.table_encoding import LARGEST_EXACT, encode
 
@@ -17,7 +18,7 @@ TEXT = st.text().filter(lambda text: text.replace("\n", "").isprintable())
 WHOLE = st.integers(-LARGEST_EXACT, LARGEST_EXACT)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=examples(40, 100))
 @given(
     st.lists(
         st.tuples(

@@ -98,6 +98,11 @@ export function chart(x, series, options = {}) {
   );
 }
 
+// How an axis of counts is written: nothing stands between two whole numbers.
+export function counted(value) {
+  return Number.isInteger(value) ? value.toLocaleString("en-US") : "";
+}
+
 function alpha(text, share) {
   const match = /^#(..)(..)(..)$/.exec(text);
   if (!match) return text;

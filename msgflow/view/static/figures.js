@@ -1,7 +1,7 @@
 // Charts of the rows of any query: lines, bars, and how values are distributed.
 
 import { clear, h } from "./dom.js";
-import { chart } from "./chart.js";
+import { chart, counted } from "./chart.js";
 import { duration, momentAxis } from "./labels.js";
 
 export const DRAWINGS = ["table", "line", "bars", "histogram"];
@@ -161,7 +161,7 @@ export class Figures {
     }], {
       title: `how many rows by ${x.label}`,
       xFormat: format([x]),
-      yFormat: (value) => value.toLocaleString("en-US"),
+      yFormat: counted,
       xName: `${x.label}, from`,
       xLabel: x.label,
     });

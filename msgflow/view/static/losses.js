@@ -4,7 +4,7 @@ import { clear, h } from "./dom.js";
 import { current, pageAddress, replace } from "./address.js";
 import { count, duration, momentAxis } from "./labels.js";
 import { besides, dataTable } from "./table.js";
-import { chart } from "./chart.js";
+import { chart, counted } from "./chart.js";
 import { command, commands, notes } from "./notice.js";
 import { onTimeline } from "./panel.js";
 
@@ -148,7 +148,7 @@ function course(app, points, isShown) {
       title: "losses over time",
       legend: true,
       xFormat: momentAxis,
-      yFormat: (value) => value.toLocaleString("en-US"),
+      yFormat: counted,
       xName: "begin [ns since begin of run]",
       onClick: (at) => {
         location.hash = pageAddress("timeline", { from: times[at], to: times[at] + width });

@@ -4,7 +4,7 @@ import { clear, h } from "./dom.js";
 import { current, pageAddress, replace } from "./address.js";
 import { duration, momentAxis } from "./labels.js";
 import { besides, dataTable } from "./table.js";
-import { chart } from "./chart.js";
+import { chart, counted } from "./chart.js";
 import { failed, waiting } from "./notice.js";
 
 export const onTimeline = (kind, id) => pageAddress("timeline", { flow: `${kind}:${id}` });
@@ -152,7 +152,7 @@ export function ratesOverTime(points, title, series) {
     chart(Array.from(points.start_at), series.map((one) => ({ stepped: true, ...one })), {
       title,
       xFormat: momentAxis,
-      yFormat: (value) => value.toLocaleString("en-US"),
+      yFormat: counted,
       xName: "begin [ns since begin of run]",
       legend: true,
     }),

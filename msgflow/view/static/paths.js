@@ -15,7 +15,7 @@ import {
 } from "./labels.js";
 import { besides, dataTable } from "./table.js";
 import { command, doubt, doubtHelp, failed, notes, sqlText, waiting } from "./notice.js";
-import { chart, redrawCharts } from "./chart.js";
+import { chart, counted, redrawCharts } from "./chart.js";
 import { doubted, pathNumbers } from "./overview.js";
 import { pathFunctions } from "./functions.js";
 
@@ -234,7 +234,7 @@ export class PathsPage {
               fill: true,
             }], {
               xFormat: duration,
-              yFormat: (value) => value.toLocaleString("en-US"),
+              yFormat: counted,
               title: "histogram of the latency",
               xName: "at least [ns]",
             }),

@@ -72,7 +72,9 @@ export function blame(table) {
         { className: "blame-nodes" },
         rows.map((row) => {
           const bar = h("span", { className: "blame-bar" });
-          bar.style.width = `${Math.max(100 * (table.share[row] ?? 0), 0.3)}%`;
+          // The share of the table is rounded, and 0 for what is short.
+          const share = table.duration_ns[row] / table.latency_ns[row] || 0;
+          bar.style.width = `${Math.max(100 * share, 0.3)}%`;
           return h(
             "li",
             {},
@@ -80,7 +82,7 @@ export function blame(table) {
             h(
               "span",
               { className: "numbers" },
-              `${duration(table.duration_ns[row])} · ${percent(table.share[row])}`,
+              `${duration(table.duration_ns[row])} · ${percent(share)}`,
             ),
             h("span", { className: "bar-track" }, bar),
           );
