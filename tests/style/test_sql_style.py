@@ -19,8 +19,9 @@ SHOWN = [file for file in FILES if file.layer in {"public", "queries"}]
 
 def code_lines(file: SqlFile) -> list[str]:
     """Lines of the body without comments and text in quotes."""
-    text = re.sub(r"'(?:[^']|'')*'", "''", re.sub(r"--[^\n]*", "", file.header.body))
-    return text.splitlines()
+    # In one pass: two hyphens in quotes, as of an option, begin no comment.
+    found = re.compile(r"--[^\n]*|(?P<quoted>'(?:[^']|'')*')")
+    return found.sub(lambda each: "''" if each["quoted"] else "", file.header.body).splitlines()
 
 
 @each(FILES)
