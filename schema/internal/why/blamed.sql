@@ -1,8 +1,8 @@
--- description: What took longest of a flow, in words: two pieces of its critical path at most, which
---     it reads as `piece`. One that took less than a fifth of the latency is not to blame.
+-- description: What took longest of a flow, in words: two pieces at most of its critical path,
+--     which it reads as `piece`. One that took less than a fifth of the latency is not to blame.
 -- grain: one row; NULL: nothing is to blame
--- param: path VARCHAR  Nodes and topics of the requirement: rclpy does not record its callbacks, but
---     which node sends a message is known
+-- param: path VARCHAR  Nodes and topics of the requirement: rclpy does not record its callbacks,
+--     but which node sends a message is known
 WITH slowest AS (
     SELECT *
     FROM (SELECT *, row_number() OVER () AS place FROM piece)
