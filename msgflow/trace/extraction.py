@@ -322,7 +322,7 @@ def _open_plain(file: IO[bytes]) -> Any:
         return lzma.LZMAFile(file)
     for first, name in _OF_ARROW.items():
         if magic.startswith(first):
-            return io.BufferedReader(_Unpacked(file, name))
+            return _Unpacked(file, name)
     return file
 
 
@@ -334,13 +334,9 @@ class _Unpacked(io.RawIOBase):
 
         self._content = pyarrow.CompressedInputStream(pyarrow.PythonFile(file, "r"), compression)
 
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: Any) -> int:
+    def read(self, size: int = -1) -> bytes:
         try:
-            chunk = self._content.read(len(buffer))
+            content: bytes = self._content.read(size)
         except OSError as error:
             raise _ArrowError(str(error)) from error
-        buffer[: len(chunk)] = chunk
-        return len(chunk)
+        return content
