@@ -62,28 +62,25 @@ class TypeParser(TokenStream):
     def declaration(self) -> None:
         """Parse a declaration that gives a type a name."""
         if self.take_if("typealias"):
-            declared = self.type_before({":="})
+            declared = self._specifier(is_alone=True)
             self.expect(":=")
-            self._named[-1][self._words({";"})] = declared
+            self._named[-1][self._words(is_alone=True)] = declared
         elif self.take_if("typedef"):
-            declared, name = self._declarator(self._specifier(one_name_is_left=True))
+            declared, name = self._declarator(self._specifier())
             self._named[-1][name] = declared
         else:
-            self.type_before({";"})
+            self._specifier(is_alone=True)
         self.expect(";")
-
-    def type_before(self, ends: set[str]) -> ctf.Type:
-        """Parse a type without declarator, which is followed by one of these signs."""
-        return self._specifier(ends=ends)
 
     def structure(self) -> ctf.Structure:
         """Parse the structure of a scope, up to its semicolon."""
-        declared = self.type_before({";"})
+        declared = self._specifier(is_alone=True)
         if not isinstance(declared, ctf.Structure):
             raise MetadataError("expected a structure")
         return declared
 
-    def _specifier(self, ends: set[str] | None = None, one_name_is_left: bool = False) -> ctf.Type:
+    def _specifier(self, *, is_alone: bool = False) -> ctf.Type:
+        """Parse a type: the name of a field follows, unless it stands alone."""
         while self.take_if("const"):
             pass
         if self.take_if("integer"):
@@ -100,13 +97,13 @@ class TypeParser(TokenStream):
             return self._variant()
         if self.take_if("enum"):
             return self._enumeration()
-        return self._find(self._words(ends, one_name_is_left))
+        return self._find(self._words(is_alone))
 
-    def _words(self, ends: set[str] | None, one_name_is_left: bool = False) -> str:
-        """Take the words of a type's name, without the declarator's name if that follows."""
+    def _words(self, is_alone: bool) -> str:
+        """Take the words of a type's name, without the name of a field if that follows."""
         words: list[str] = []
         while self.token.kind == "name":
-            if (ends is None or one_name_is_left) and words and self.after().kind != "name":
+            if not is_alone and words and self.after().kind != "name":
                 break
             word = self.take().value
             if word != "const":
@@ -254,7 +251,7 @@ class TypeParser(TokenStream):
         name = self.name() if self.token.kind == "name" else ""
         container: ctf.Type | None = None
         if self.take_if(":"):
-            container = self._specifier(ends={"{"})
+            container = self._specifier(is_alone=True)
         if self.token.value != "{":
             return self._find(f"enum {name}")
         if container is None:
