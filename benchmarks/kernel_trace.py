@@ -10,6 +10,7 @@ import struct
 import uuid
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,8 +19,6 @@ import pyarrow as pa
 import msgflow.trace
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
 _CONTENT_BYTES = 200_000

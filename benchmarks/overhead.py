@@ -26,9 +26,9 @@ import subprocess
 import tempfile
 import time
 from collections import defaultdict
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from recording.recorder import one_at_a_time, require, ros_environment
 from recording.tracetools import build_tracetools
@@ -40,9 +40,6 @@ from msgflow.record.profile import Rate, recorded_samples
 from msgflow.record.python_path import PYTHON_NODES
 from msgflow.record.recording import recorded_bytes
 from msgflow.record.session import Channel, can_trace_kernel, recording_session
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 _CHAIN = Path(__file__).parent / "recording" / "chain.py"
 _HOPS = 5

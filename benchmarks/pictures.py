@@ -21,9 +21,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import SplitResult, urlsplit
 
 from playwright.sync_api import sync_playwright
@@ -34,9 +35,6 @@ from msgflow_sim import simulate
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 from browser import ARGUMENTS, find_browser
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 EVENTS_PER_FACTOR = 66_000
 # Callback instances, publications, takes and states of executors.

@@ -20,6 +20,7 @@ import re
 import shutil
 import sys
 import textwrap
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,8 +32,6 @@ from msgflow.ingest import ingest
 from msgflow_sim import simulate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     Row = dict[str, Any]
 
 _SECONDS = 10

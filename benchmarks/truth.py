@@ -32,12 +32,12 @@ import os
 import sys
 import tempfile
 from collections import defaultdict
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from random import Random
-from typing import TYPE_CHECKING
 
 from scoring import Drop, Score, compare_real, compare_recorded, compare_simulated
 
@@ -52,9 +52,6 @@ from msgflow_sim import (
     scenarios,
     simulate,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
 
 SHARED_TRACES = Path(__file__).parents[1] / ".." / "shared" / "traces"
 SECOND = 1_000_000_000

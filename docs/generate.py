@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,8 +29,6 @@ from msgflow.query.catalogue import load_queries, query_names
 from msgflow.sql.statement import RECORDED
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     import sqlalchemy
 
     from msgflow.sql.header import Column, Header, Param

@@ -23,6 +23,7 @@ these constraints, nor the primary keys of views. Create databases with `msgflow
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 import sqlalchemy
@@ -33,8 +34,6 @@ from msgflow.db import objects
 from msgflow.db.tables import STORE
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     from sqlalchemy.types import TypeEngine
 
     from msgflow.sql.header import Column as HeaderColumn

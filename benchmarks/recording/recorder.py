@@ -10,17 +10,14 @@ import shutil
 import subprocess
 import tempfile
 import time
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow import trace
 from msgflow.record.daemon import session_daemon
 from msgflow.record.python_path import PYTHON_NODES
 from msgflow.record.session import Channel, recording_session
 from recording.tracetools import build_tracetools
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
 
 _NODES = Path(__file__).with_name("nodes.py")
 # Those who hear go last. Seconds.

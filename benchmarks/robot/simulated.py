@@ -9,7 +9,7 @@ ask the map server.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Collection
 
 from msgflow_sim.entity import (
     MILLISECOND,
@@ -24,9 +24,6 @@ from msgflow_sim.entity import (
     Work,
 )
 from msgflow_sim.system import Executor, Group, Host, KernelTrace, Load, Node, Process, Scenario
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
 
 _LOAD = Load("backup", 7101, period_ns=500 * MILLISECOND, busy_ns=3 * MILLISECOND, cpus=(3,))
 _HOG = Load(

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import duckdb
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 EXCUSE = "events are missing"
 """What `drops.sql` and `orphans.sql` say of a reason that a hole excuses."""

@@ -7,8 +7,9 @@ import errno
 import importlib.util
 import resource
 import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pyarrow as pa
 
@@ -17,9 +18,6 @@ from msgflow.db.memory import bound, bound_process, default_limit, set_memory_li
 from msgflow.errors import QueryError, TraceError, UsageError
 from msgflow.trace.extraction import LIMIT_VARIABLE, limit_of
 from msgflow.trace.regular_file import irregular
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 _HEADER = "std_msgs/msg/Header"
 _SCHEMA = pa.schema(

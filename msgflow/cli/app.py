@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from importlib.metadata import EntryPoint, EntryPoints
 from itertools import takewhile
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -22,9 +23,6 @@ from msgflow.cli.signals import HANDLER
 from msgflow.errors import ExitCode, UsageError, require_utf8
 from msgflow.sql.interrupt import Terminated
 from msgflow.version import __version__
-
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint, EntryPoints
 
 COMMANDS = {
     "record": (

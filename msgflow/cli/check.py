@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
@@ -20,8 +21,6 @@ from msgflow.text.values import count, format_cell
 from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
     from msgflow.db.finding import Finding
 
 _WIDTH = 100

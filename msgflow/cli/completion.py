@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
 from msgflow.files.default_files import DEFAULT_DATABASE, DEFAULT_PATHS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
 
 VARIABLE = "_MSGFLOW_COMPLETE"
 # Besides letters and digits of any language. Quotes, $, `, \\ and globs are never completed.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,8 +14,6 @@ from msgflow.database import Database
 from msgflow.text.values import count
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from msgflow.export.folded import FoldedStacks
     from msgflow.export.mcap import ExportedMcap
     from msgflow.export.otlp import ExportedTraces

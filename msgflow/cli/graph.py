@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from msgflow.cli.operation import parameters_of
@@ -11,8 +12,6 @@ from msgflow.export.formats import Format
 from msgflow.run.choice import choose_one
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from msgflow.export.graph import GraphFormat
     from msgflow.result.query_result import QueryResult
 

@@ -7,6 +7,7 @@ import os
 import shlex
 import shutil
 import sys
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypedDict, cast
 
@@ -22,8 +23,6 @@ from msgflow.text.values import count, printable
 from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
     from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
     from msgflow.fleet.ingest import FleetProgress
     from msgflow.ingest import IngestProgress
     from msgflow.trace import Progress as ReadingProgress

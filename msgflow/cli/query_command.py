@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Callable, Sequence, Set
 from copy import copy
 from inspect import Parameter
 from itertools import pairwise
@@ -31,8 +32,6 @@ from msgflow.result.layout import MOST_ROWS
 from msgflow.result.rows import Times
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence, Set
-
     from msgflow.result.query_result import QueryResult
     from msgflow.sql.header import Header, Param
     from msgflow.sql.value import Value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,8 +17,6 @@ from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.run.choice import require_run_name
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
     from msgflow.record.recording import Status
 
 _SECONDS_BETWEEN_LINES = 10.0

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from argparse import REMAINDER
-from typing import TYPE_CHECKING
+from argparse import REMAINDER, ArgumentParser, Namespace
 
 from ros2cli.command import CommandExtension
-
-if TYPE_CHECKING:
-    from argparse import ArgumentParser, Namespace
 
 _NO_PREFIX = "\0"
 

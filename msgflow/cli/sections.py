@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from msgflow.cli.output import print_text
@@ -12,9 +14,6 @@ from msgflow.result.screen import screen_lines
 from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-    from pathlib import Path
-
     from msgflow.result.query_result import QueryResult
 
 

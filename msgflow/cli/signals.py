@@ -10,14 +10,11 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from types import FrameType
 
 from msgflow.errors import ExitCode
 from msgflow.sql.interrupt import SIGNALS, Terminated
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from types import FrameType
 
 
 class SignalHandler:

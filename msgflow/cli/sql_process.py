@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.confined.process import ConfinedProcess
@@ -12,9 +14,6 @@ from msgflow.db.memory import bound_process, default_limit
 from msgflow.result.query_result import QueryResult
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
     import pyarrow as pa
 
     Write = Callable[[Any], int]

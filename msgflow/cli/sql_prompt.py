@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import readline
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable
+from pathlib import Path
 
 from msgflow.cli.errors import print_exception
 from msgflow.cli.output import print_result, print_status
 from msgflow.database import Database
 from msgflow.errors import MsgflowError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-    from pathlib import Path
 
 _WORDS = (
     "SELECT", "FROM", "JOIN", "LEFT JOIN", "USING", "ON", "WHERE", "GROUP BY", "ORDER BY", "LIMIT",

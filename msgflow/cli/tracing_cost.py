@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from msgflow.text.values import ARROW, format_duration
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     from msgflow.database import Database
     from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run

@@ -7,6 +7,7 @@ import shlex
 import shutil
 import sys
 import time
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing, contextmanager
 from functools import partial
@@ -28,8 +29,6 @@ from msgflow.run.window import duration_ns
 from msgflow.text.values import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
     from msgflow.record.recording import Status
     from msgflow.watch.alarm import Alarm
     from msgflow.watch.diagnostics import Diagnostics

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -23,8 +24,6 @@ from msgflow.text.values import printable
 from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from msgflow.query.why import Explanation
     from msgflow.result.query_result import QueryResult
 

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgflow.errors import UsageError
 from msgflow.files.text_file import read_text
 from msgflow.files.yaml_file import YamlFile, line_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 METHODS = ("none", "messages")
 FIELDS = ("offset_ns", "drift_ppb", "reference_ns", "uncertainty_ns")

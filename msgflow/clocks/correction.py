@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,8 +11,6 @@ from msgflow.db.derivation import derive_from_clocks
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     import duckdb
 
     from msgflow.clocks.clocks_file import ClockSync, GivenClock

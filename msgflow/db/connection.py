@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import shlex
 import tempfile
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import duckdb
 
@@ -22,9 +22,6 @@ from msgflow.db.sandbox import open_file, opening, remove_abandoned_spills, requ
 from msgflow.errors import DatabaseError
 from msgflow.sql.failure import database_errors
 from msgflow.sql.quoting import literal
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 # Keys are left out: their place in the statement differs, and they hold no SQL.
 _RENDERED = r"""

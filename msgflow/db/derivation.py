@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -11,8 +12,6 @@ from msgflow.db.store_table import store_tables
 from msgflow.sql.statement import RECORDED, recorded, with_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
     import duckdb
 
     from msgflow.sql.header import Header

@@ -10,8 +10,8 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import duckdb
 
@@ -23,9 +23,6 @@ from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
 from msgflow.sql.quoting import literal
 from msgflow.version import __version__
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 # Versions of msgflow that alternate on one machine each keep theirs.
 _MOST_KEPT = 10

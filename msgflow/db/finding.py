@@ -18,6 +18,7 @@ say. The phase database is about msgflow itself: no ingest looks for what it can
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -28,8 +29,6 @@ from msgflow.sql.quoting import literal
 from msgflow.sql.statement import Statements
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
     import duckdb
 
 PHASES = ("input", "recording", "database")

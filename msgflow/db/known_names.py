@@ -6,14 +6,11 @@ cannot be read has no names.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from threading import Timer
-from typing import TYPE_CHECKING
 
 from msgflow.errors import DatabaseError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
 
 MOST_NAMES = 1_000
 _SECONDS = 1.0

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import resource
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import duckdb
 
 from msgflow.errors import DatabaseError
 from msgflow.sql.failure import is_of_the_file
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 # DuckDB's own limit is 80 % of the memory of the machine or container; this gives a quarter of it.
 _SHARE_OF_OWN_LIMIT = 0.25 / 0.8

@@ -8,10 +8,10 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import duckdb
 
@@ -33,9 +33,6 @@ from msgflow.db.workspace import workspace
 from msgflow.errors import DatabaseError
 from msgflow.files.resources import resource_directory
 from msgflow.sql.failure import database_errors
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
 
 
 @dataclass(frozen=True)

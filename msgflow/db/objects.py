@@ -6,6 +6,7 @@ A public view that shows a table unchanged has no file: `store.sql` says of the 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -20,8 +21,6 @@ from msgflow.sql.quoting import identifier, literal
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
     import duckdb
 
     from msgflow.sql.header import Column

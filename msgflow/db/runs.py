@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from msgflow.db.connection import connect
@@ -15,9 +17,6 @@ from msgflow.sql.failure import database_errors
 from msgflow.sql.interrupt import interruptible
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from pathlib import Path
-
     import duckdb
 
     from msgflow.run.choice import Run

@@ -11,8 +11,8 @@ import contextlib
 import os
 import shutil
 import tempfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import duckdb
 
@@ -21,9 +21,6 @@ from msgflow.db.workspace import lock_holder, remove_abandoned_workspaces
 from msgflow.errors import DatabaseError, DatabaseInUseError, require_utf8
 from msgflow.files.temporary_owner import left_behind, mark
 from msgflow.sql.failure import in_words
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
 
 # Older clients (DBeaver, Grafana, notebooks) read files of this storage version. One before it
 # would lose which parts of stored statements are MATERIALIZED.

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from msgflow.db.store_table import store_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     import duckdb
 
     from msgflow.db.store_table import StoreColumn, StoreTable

@@ -7,16 +7,13 @@ than a small ingest takes to run. The top of the file says how it is written.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Column, Header
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from pathlib import Path
 
 _TABLE = re.compile(
     r"^-- (?P<grain>.*)\n(?:-- view: (?P<view>(?:.*\n-- )*.*)\n)?"

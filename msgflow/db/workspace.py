@@ -8,13 +8,10 @@ import os
 import shlex
 import shutil
 import uuid
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import DatabaseError, require_utf8
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 _PREFIX = ".msgflow-"
 _LOCK = ".lock"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import IO, TYPE_CHECKING
 
 import pyarrow as pa
@@ -11,8 +12,6 @@ from msgflow.events.formats import TABLES, EventFormat, table_writer
 from msgflow.events.sequence import COLUMNS, Sequencer, json_column, json_line, text_line
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
     from msgflow.events.selection import Selection
     from msgflow.trace import Progress
 

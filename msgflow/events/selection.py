@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from fnmatch import fnmatchcase
 from itertools import groupby
 from operator import attrgetter
@@ -19,8 +20,6 @@ from msgflow.trace import PACKET, EventBatch
 from msgflow.trace.columns import COMMON_SCHEMA
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
     from msgflow.trace import Progress, TraceSet
 
 BATCH_ROWS = 20_000

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import duckdb
@@ -13,8 +13,6 @@ from msgflow.sql.quoting import literal
 from msgflow.trace.columns import BASE, COMMON_SCHEMA
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from msgflow.trace import EventBatch, TraceInfo
 
 Rendering = Callable[[str, pa.Schema], str]

@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import re
 import shutil
+from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -19,9 +21,6 @@ from msgflow.sql.json_fields import column_name, exact
 from msgflow.sql.quoting import identifier
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
     from msgflow.events.selection import Selection
     from msgflow.trace import Progress
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
@@ -10,8 +11,6 @@ from msgflow.files.atomic import replacing
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import duckdb
 
     from msgflow.run.choice import Run

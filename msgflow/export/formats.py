@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Iterator, Mapping
 from enum import StrEnum
 from itertools import chain, pairwise
+from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeVar
 
 from msgflow.errors import UsageError
 from msgflow.text.json_value import json_text, json_value
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-    from pathlib import Path
-
     import pyarrow as pa
 
     from msgflow.result.query_result import QueryResult

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.export.formats import SUFFIXES, Format, by_suffix
@@ -15,9 +17,6 @@ from msgflow.text.json_value import json_value
 from msgflow.text.values import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
     import duckdb
 
     from msgflow.result.query_result import QueryResult

@@ -6,7 +6,9 @@ these, while not all of them decode JSON, or plot messages of protobuf without c
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
@@ -16,9 +18,6 @@ from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
     import duckdb
 
     from msgflow.run.choice import Run

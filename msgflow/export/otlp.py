@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
@@ -12,9 +14,6 @@ from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
     import duckdb
 
     from msgflow.run.choice import Run

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
@@ -12,9 +14,6 @@ from msgflow.sql.failure import format_errors
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-    from pathlib import Path
-
     import duckdb
 
     from msgflow.run.choice import Run

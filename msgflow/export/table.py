@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import repeat
 from operator import add
 from typing import TYPE_CHECKING
@@ -12,8 +13,6 @@ from msgflow.result.rows import cells
 from msgflow.text.markdown import markdown_line, rule_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     from msgflow.result.query_result import QueryResult
 
 _GAP = "  "

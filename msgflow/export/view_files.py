@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from itertools import product
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.export.formats import write_csv
@@ -12,8 +13,6 @@ from msgflow.files.atomic_directory import PARTITION_FILE, replacing_entries
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import duckdb
     import pyarrow as pa
 

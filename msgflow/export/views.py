@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.db.objects import public_names
@@ -11,9 +13,6 @@ from msgflow.run.window import WHOLE, Window
 from msgflow.text.name_suggestions import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
     import duckdb
     import pyarrow as pa
 

@@ -6,16 +6,12 @@ import os
 import shutil
 import stat
 import tempfile
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.files.temporary_owner import left_behind, mark
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
 
 _SUFFIX = ".part"
 _STDOUT = 1

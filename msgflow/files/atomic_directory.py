@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.files.temporary_owner import left_behind, mark
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
 
 PARTITION_FILE = "data.parquet"
 """The only file in a directory of one run of a view."""

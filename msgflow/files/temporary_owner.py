@@ -8,13 +8,10 @@ import os
 import re
 import shutil
 import tempfile
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 # A process number is valid in this container, until the machine starts again.
 _NAMESPACE = ("/proc/sys/kernel/random/boot_id", "/proc/self/ns/pid")

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import os
 import stat
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from msgflow.errors import UsageError
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 # No user writes more by hand. Parsers of YAML need a hundred times as much memory.
 MOST_BYTES = 1_000_000

@@ -5,16 +5,14 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
-from typing import TYPE_CHECKING, Any, NoReturn
+from pathlib import Path
+from typing import Any, NoReturn
 
 from msgflow.errors import UsageError
 from msgflow.files.text_file import read_text
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
 _WIDTH = 80
 _PLAIN = re.compile(r"[A-Za-z/][\w/.-]*")

@@ -15,9 +15,10 @@ import shutil
 import sys
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgflow.database import Database
 from msgflow.db.connection import connect
@@ -27,9 +28,6 @@ from msgflow.fleet.lake import Lake
 from msgflow.fleet.part import write_part
 from msgflow.fleet.recording import fetch, look_at
 from msgflow.fleet.task import RESULT, STAGE, Outcome, Reason, Task, without_secrets
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 _ORPHAN = 1
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +19,6 @@ from msgflow.query.selection import CASES, CUT_COLUMN
 from msgflow.text.name_suggestions import meant_or, nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
     from msgflow.fleet.lake import Lake
 
 Row = dict[str, Any]

@@ -14,11 +14,12 @@ import random
 import re
 import shutil
 import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
+from typing import Any, BinaryIO, TypeVar
 from urllib.parse import urlsplit
 
 from pyarrow.fs import (
@@ -32,9 +33,6 @@ from pyarrow.fs import (
 from msgflow.errors import DatabaseError, UsageError, require_utf8
 from msgflow.files.temporary_owner import mark
 from msgflow.trace.regular_file import open_regular
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 _T = TypeVar("_T")
 

@@ -8,8 +8,10 @@ import json
 import random
 import time
 from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import MsgflowError, TraceError, UsageError
@@ -21,9 +23,6 @@ from msgflow.fleet.task import PASSING, Options, Outcome, Reason, Task, needs, w
 from msgflow.fleet.workers import make_workers
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-    from pathlib import Path
-
     from msgflow.fleet.recording import State
     from msgflow.fleet.workers import Workers
 

@@ -11,9 +11,11 @@ import fcntl
 import os
 import shlex
 import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any
+from contextlib import AbstractContextManager, contextmanager, suppress
+from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet
@@ -40,12 +42,6 @@ from msgflow.fleet.parquet import read_parquet
 from msgflow.sql.failure import first_line
 from msgflow.sql.statement import registered
 from msgflow.version import __version__
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-    from contextlib import AbstractContextManager
-    from pathlib import Path
-
 
 _READ_AT_ONCE = 16
 # Small groups of rows, run after run: a query of few runs reads few groups of a pack.

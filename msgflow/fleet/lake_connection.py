@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 import shlex
 import tempfile
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,8 +34,6 @@ from msgflow.text.name_suggestions import meant_or, nearest
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     from msgflow.fleet.lake import Lake
 
 _COLUMN = re.compile(r'Referenced column "((?:[^"]|"")*)"')

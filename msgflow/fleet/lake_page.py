@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -19,8 +20,6 @@ from msgflow.view.assets import single_page
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from msgflow.fleet.lake import Lake
 
 # Most labels with a table on the page; each takes a query over all flows.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -34,8 +35,6 @@ from msgflow.sql.statement import Statements
 from msgflow.text.name_suggestions import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_connection import Choice
     from msgflow.sql.header import Header

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import io
 import json
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import pyarrow as pa
 
@@ -15,9 +16,6 @@ from msgflow.files.text_file import MOST_BYTES
 from msgflow.fleet.file_store import Store, normal_url
 from msgflow.fleet.parquet import read_parquet
 from msgflow.fleet.recording import Recording
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
 
 SUFFIXES = (".csv", ".jsonl", ".parquet")
 PATH = "path"

@@ -7,6 +7,8 @@ time or before, stays as it is.
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -21,9 +23,6 @@ from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
     import duckdb
 
     from msgflow.fleet.file_store import Store

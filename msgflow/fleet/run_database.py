@@ -6,6 +6,7 @@ import contextlib
 import os
 import secrets
 import shlex
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,8 +22,6 @@ from msgflow.fleet.part import run_key
 from msgflow.trace.extraction import LIMIT_VARIABLE, limit_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
     import duckdb
 
     from msgflow.fleet.lake import Lake

@@ -5,15 +5,12 @@ from __future__ import annotations
 import fnmatch
 import glob
 import os
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 from msgflow.errors import UsageError
 from msgflow.fleet.file_store import S3, Store, normal_url
 from msgflow.fleet.manifest import is_manifest, read_manifest
 from msgflow.fleet.recording import Recording
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 
 def find_recordings(

@@ -5,16 +5,14 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgflow.errors import UsageError
 from msgflow.fleet.task import Outcome, Reason, Task
 from msgflow.fleet.task_process import run_task
 from msgflow.sql.failure import first_line
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 LOCAL = "local"
 _SCRATCH = "scratch"

@@ -8,13 +8,12 @@ they are reported; that they have the time of initialisation shows it.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from msgflow.ingest.catalogue import load
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-
     import duckdb
 
     from msgflow.ingest.catalogue import Tracepoint

@@ -9,6 +9,7 @@ CPU has in its PID namespace: they are rows of `raw.kernel_thread`, one per roun
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,8 +20,6 @@ from msgflow.ingest.groups import NONE, Groups, Latest, Numbers, gathered
 from msgflow.trace.numpy_arrow import texts_to_arrow, to_arrow, to_numpy
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from numpy.typing import NDArray
 
     from msgflow.ingest.catalogue import Catalogue, Tracepoint

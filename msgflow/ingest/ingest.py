@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,8 +36,6 @@ from msgflow.sql.failure import database_errors, in_words
 from msgflow.sql.interrupt import interruptible, noted_interrupts
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
     from msgflow.clocks.clocks_file import ClockSync
     from msgflow.db.finding import Finding
     from msgflow.links.links_file import LinksFile

@@ -6,6 +6,7 @@ import contextlib
 import itertools
 import time
 from collections import Counter
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -22,8 +23,6 @@ from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_numpy, without
 from msgflow.trace.prefetch import prefetched
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
-
     import duckdb
 
     from msgflow.ingest.catalogue import Tracepoint

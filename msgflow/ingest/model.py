@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import re
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -22,8 +23,6 @@ from msgflow.ingest.catalogue import load
 from msgflow.sql.statement import with_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping
-
     import duckdb
 
     from msgflow.sql.header import Header

@@ -10,6 +10,8 @@ it.
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -22,9 +24,6 @@ from msgflow.sql.statement import Statements
 from msgflow.trace.numpy_arrow import is_valid, to_arrow, to_numpy
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from contextlib import ExitStack
-
     import duckdb
     import pyarrow as pa
     from numpy.typing import NDArray

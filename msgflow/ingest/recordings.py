@@ -12,6 +12,7 @@ from __future__ import annotations
 import itertools
 import os
 import re
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,8 +22,6 @@ from msgflow.ingest.hostnames import hostnames_of
 from msgflow.trace import archive
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
-
     from msgflow.trace import TraceInfo
 
 # What LTTng makes below the folder of a session: buffers by user or by process, and chunks.

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.ingest.catalogue import load
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from msgflow.trace import Damage, TraceInfo
 
 _SHOWN = 5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,8 +21,6 @@ from msgflow.sql.interrupt import noted_interrupts
 from msgflow.sql.quoting import literal
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import duckdb
 
     from msgflow.clocks.clocks_file import ClockSync

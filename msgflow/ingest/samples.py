@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,8 +15,6 @@ from msgflow.trace import archive
 from msgflow.trace.perf_script import DATA, TEXT, read_script, sample_files, write_script
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     import duckdb
 
     from msgflow.sql.interrupt import Interrupts

@@ -7,6 +7,7 @@ looking for predecessors later would sort the largest tables there are.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,8 +19,6 @@ from msgflow.trace.columns import COMMON_SCHEMA
 from msgflow.trace.numpy_arrow import is_valid, texts_to_arrow, to_arrow, to_numpy
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
     from numpy.typing import NDArray
 
     from msgflow.ingest.catalogue import Catalogue, Tracepoint

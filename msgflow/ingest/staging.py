@@ -10,6 +10,8 @@ events of the user and of known tracepoints, but those of the kernel, without pa
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.db.transaction import transaction
@@ -22,9 +24,6 @@ from msgflow.sql.statement import internal_sql
 from msgflow.trace import PACKET
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
-    from pathlib import Path
-
     import duckdb
     import pyarrow as pa
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+from collections.abc import Sequence, Set
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,8 +17,6 @@ from msgflow.trace import archive
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence, Set
-
     import duckdb
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -12,8 +13,6 @@ from msgflow.sql.json_fields import column_name, json_fields
 from msgflow.trace.columns import COMMON_SCHEMA
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
     import duckdb
 
     from msgflow.trace import TraceInfo

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,8 +13,6 @@ from msgflow.links.matching import match_links, matches
 from msgflow.sql.statement import internal_sql, registered
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
     import duckdb
 
     from msgflow.errors import UsageError

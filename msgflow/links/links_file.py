@@ -22,12 +22,10 @@ topics:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from msgflow.files.yaml_file import Text, YamlFile, line_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 # Links to what a node publishes later, from messages that it keeps.
 # The synchronous ones need a message of every input.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from graphlib import CycleError, TopologicalSorter
@@ -14,8 +15,6 @@ from msgflow.sql.statement import internal_sql
 from msgflow.text.name_suggestions import meant_or, nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-
     import duckdb
 
     from msgflow.files.yaml_file import Text, YamlFile

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +11,6 @@ from msgflow.files.yaml_file import list_lines, quoted
 from msgflow.text.values import printable
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from msgflow.run.choice import Run
 
 _HEAD = (

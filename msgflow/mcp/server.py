@@ -12,6 +12,7 @@ import functools
 import json
 import tempfile
 import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,8 +29,6 @@ from msgflow.query.catalogue import load_queries, load_query, query_names
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
-
     from mcp.server.mcpserver import MCPServer
 
     from msgflow.result.query_result import QueryResult

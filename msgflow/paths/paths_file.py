@@ -9,7 +9,9 @@ paths:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
@@ -18,9 +20,6 @@ from msgflow.query.names import VISITS, require_names
 from msgflow.text.name_suggestions import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
     import duckdb
 
     from msgflow.run.choice import Run

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import re
 from collections import Counter, defaultdict
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from msgflow.files.yaml_file import list_lines, quoted
 from msgflow.text.values import ARROW, format_duration, printable
 from msgflow.text.wrapping import wrap_path
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 _HEAD = """\
 # Paths of a run by name, for --path: keep those that matter, and call them as

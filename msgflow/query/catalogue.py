@@ -5,6 +5,7 @@ A query may have variants, each in a file of its own: an option chooses one.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
@@ -17,8 +18,6 @@ from msgflow.sql.value import parse_text
 from msgflow.text.name_suggestions import nearest
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
-
     from msgflow.sql.value import Value
 
 COMMANDS = ("clocks", "graph", "info", "links")

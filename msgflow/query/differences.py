@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +15,6 @@ from msgflow.query.selection import CUT_COLUMN
 from msgflow.sql.statement import internal_sql, registered
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from msgflow.result.query_result import QueryResult
 
 STATISTICS = ("median", "mean", "p95", "p99", "max")

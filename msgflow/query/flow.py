@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +16,6 @@ from msgflow.sql.failure import query_errors
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import duckdb
     import pyarrow as pa
 

@@ -5,6 +5,7 @@ The number of a path is the same in every command: its place among all paths of 
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -15,8 +16,6 @@ from msgflow.text.name_suggestions import did_you_mean
 from msgflow.text.values import ARROW
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     import duckdb
 
     from msgflow.result.query_result import QueryResult

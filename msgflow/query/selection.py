@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,8 +10,6 @@ from msgflow.errors import UsageError
 from msgflow.text.name_suggestions import column_named
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
     from msgflow.sql.header import Header
     from msgflow.sql.value import Value
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 import subprocess
 import tempfile
 import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
 from msgflow.errors import RecordingError
 from msgflow.record.lttng import is_daemon_running, sessions
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
 
 _LONGEST_START = 10.0
 _LONGEST_END = 20.0

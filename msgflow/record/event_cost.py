@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from threading import Timer
-from typing import TYPE_CHECKING
 
 from msgflow.errors import RecordingError
 from msgflow.files.temporary_owner import mark, temporary_directory
 from msgflow.record.session import TEMPORARY, Channel, recording_session
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 USUAL_NS = 158.0
 """Nanoseconds of an event, as the authors of the method have them."""

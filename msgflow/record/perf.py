@@ -7,14 +7,11 @@ import signal
 import socket
 import subprocess
 import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from msgflow.record.daemon import started
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-    from pathlib import Path
 
 # The clock of LTTng.
 _RECORD = ("perf", "record", "--clockid=CLOCK_MONOTONIC")

@@ -6,17 +6,14 @@ import os
 import re
 import shutil
 import subprocess
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from msgflow.errors import TraceError, UsageError
 from msgflow.record import perf
 from msgflow.trace.perf_script import DATA, TEXT, write_script
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-    from pathlib import Path
 
 # A clock of each CPU is there in virtual machines, too. Symbols are resolved at once: what perf
 # keeps for later is not needed.

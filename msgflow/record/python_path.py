@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 PYTHON_NODES = Path(__file__).resolve().with_name("python_nodes")
 """The folder; Python runs its `sitecustomize` when it starts."""

@@ -6,6 +6,7 @@ import os
 import shlex
 import shutil
 import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -34,8 +35,6 @@ from msgflow.sql.interrupt import noted_interrupts, until_interrupted
 from msgflow.trace.ctf.packet_index import content_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
     from msgflow.record.profile import Rate
 
 BYTES_OF_EVENT = 45

@@ -5,14 +5,11 @@ from __future__ import annotations
 import shlex
 import shutil
 import subprocess
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from msgflow.record import perf
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 # As docs/scheduling.md asks for them, by the name of LTTng: that of perf.
 _NAMES = {

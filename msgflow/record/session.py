@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from msgflow.errors import RecordingError, UsageError
 from msgflow.files.temporary_owner import is_abandoned, mark, remove_abandoned_directories
 from msgflow.record.lttng import is_daemon_running, lttng, sessions
 from msgflow.record.scheduling import KERNEL_EVENTS
 from msgflow.trace.regular_file import read_regular
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-    from pathlib import Path
 
 # Of ROS 2; of an instrumented DDS; of CARET; of Agnocast.
 EVENTS = ("ros2:*", "dds:*", "ros2_caret:*", "agnocast:*")

@@ -10,6 +10,7 @@ not shown.
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import permutations
@@ -22,8 +23,6 @@ from msgflow.text.values import ARROW, MOMENT, NULL, column_title, format_cell, 
 from msgflow.text.wrapping import longest_piece, longest_word, wrap
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     import pyarrow as pa
 
     from msgflow.result.rows import Rows

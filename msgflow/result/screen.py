@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import takewhile
 from typing import TYPE_CHECKING
 
@@ -12,8 +13,6 @@ from msgflow.text.values import ARROW
 from msgflow.text.wrapping import wrap, wrap_path
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
     from msgflow.result.layout import Layout, ShownColumn
 
 # A path that begins or ends like an earlier one is cut if that saves more than so many steps.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy
@@ -12,8 +13,6 @@ from msgflow.errors import UsageError
 from msgflow.run.simulated import known_moments
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from msgflow.run.choice import Run
 
 _NS = "_ns"

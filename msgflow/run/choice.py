@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import duckdb
 
 _INTEGER = re.compile(r"-?\d+")

@@ -5,14 +5,13 @@ Before the first and after the last moment it runs as fast as beside them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from msgflow.run.choice import Run
 
 

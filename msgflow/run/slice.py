@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypedDict
 
@@ -10,8 +11,6 @@ from msgflow.run.choice import Run, choose_one, choose_runs, read_runs
 from msgflow.run.window import Window, time_point
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import duckdb
 
 

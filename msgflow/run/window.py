@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import lru_cache
@@ -13,8 +14,6 @@ from msgflow.run.choice import integer
 from msgflow.run.simulated import recorded_ns
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from msgflow.run.choice import Run
 
 MINIMUM_NS = -(2**63)

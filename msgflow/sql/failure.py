@@ -7,16 +7,13 @@ import re
 import shlex
 import shutil
 import struct
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import duckdb
 
 from msgflow.errors import DatabaseError, QueryError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 _FULL = re.compile(r"no space left|disk quota|max_temp_directory_size|not enough space", re.I)
 _REFUSED = re.compile(r"permission denied|read-only file system|operation not permitted", re.I)

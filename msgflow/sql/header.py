@@ -77,16 +77,13 @@ What few recordings have may stand behind `WHERE $has_kernel`, or another name o
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from msgflow.files.resources import resource_directory
 from msgflow.sql.value import Value, is_integer, parse_literal
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from pathlib import Path
 
 _HEAD = re.compile(r"(?:--[^\n]*(?:\n|$))*")
 _FIELD = re.compile(r"-- (?P<key>[a-z_]+):(?: +(?P<value>\S.*))?")

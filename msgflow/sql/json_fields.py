@@ -6,15 +6,12 @@ Names of fields come from traces: they stand in SQL only as quoted literals.
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 import pyarrow as pa
 
 from msgflow.sql.quoting import literal
 from msgflow.trace.columns import labels_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
 
 MOST_LAMBDAS = 2
 """DuckDB needs ten times as long to bind each further lambda inside a lambda."""

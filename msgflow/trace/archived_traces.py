@@ -7,15 +7,12 @@ import os
 import shutil
 import tempfile
 import weakref
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.archive import is_archive
 from msgflow.trace.extraction import unpack
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
 
 _PREFIX = "msgflow-"
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 import shlex
 from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -24,9 +26,6 @@ from msgflow.trace.time_base import on_one_base
 from msgflow.trace.trace_set import Report, TraceSet
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-    from pathlib import Path
-
     from msgflow.trace.archived_traces import Unpacked
     from msgflow.trace.model import TraceLocation
     from msgflow.trace.trace_set import Batches, Wanted

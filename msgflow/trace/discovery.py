@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import os
 import shlex
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError, require_utf8
 from msgflow.trace import metadata_frame
 from msgflow.trace.archive import is_archive
 from msgflow.trace.model import TraceLocation
 from msgflow.trace.regular_file import irregular, read_regular, unreadable_error
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
 
 _RECORD_HINT = "ros2 trace"
 _RECORDING_HINT = f"messages are not traces, record one: {_RECORD_HINT}"

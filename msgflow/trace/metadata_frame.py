@@ -6,15 +6,12 @@ No reader meets a file that is cut off, or one that is no metadata.
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from enum import Enum
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from msgflow.errors import TraceError
 from msgflow.trace.regular_file import read_regular
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 FILE_NAME = "metadata"
 

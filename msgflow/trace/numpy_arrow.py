@@ -6,14 +6,13 @@ something of it: that takes longer than reading a small trace. Nor is `numpy.ma`
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
 _NUMBERS = {

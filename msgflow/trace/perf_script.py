@@ -5,17 +5,14 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.discovery import directories
 from msgflow.trace.regular_file import open_regular
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from io import BufferedReader
 
 DATA, TEXT = "perf.data", "perf.script"
 """Names of the files: what perf recorded, and what `perf script` made of it."""

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Generator
 from queue import SimpleQueue
 from threading import Semaphore, Thread
-from typing import TYPE_CHECKING, TypeVar
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
+from typing import TypeVar
 
 Item = TypeVar("Item")
 

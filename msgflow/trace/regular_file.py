@@ -6,13 +6,10 @@ import errno
 import os
 import shlex
 import stat
-from typing import TYPE_CHECKING
+from io import BufferedReader
+from pathlib import Path
 
 from msgflow.errors import TraceError
-
-if TYPE_CHECKING:
-    from io import BufferedReader
-    from pathlib import Path
 
 _KINDS = {
     stat.S_IFIFO: "a pipe",

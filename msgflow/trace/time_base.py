@@ -11,12 +11,11 @@ Time namespaces and clones of a machine have the boot of another one, and a cloc
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from msgflow.trace.model import TraceInfo
 
 # Uuid and name of a clock.

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 from msgflow.run.window import format_epoch
 from msgflow.text.values import format_duration, printable
 
 if TYPE_CHECKING:
-    from typing import Any
-
     from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
 

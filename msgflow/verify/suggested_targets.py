@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from glob import escape
 from typing import TYPE_CHECKING
 
@@ -11,8 +12,6 @@ from msgflow.sql.statement import internal_sql, registered
 from msgflow.verify.metrics import PATH
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
     import pyarrow as pa
 
     from msgflow.run.choice import Run

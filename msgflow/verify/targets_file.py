@@ -18,15 +18,13 @@ targets:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from msgflow.files.yaml_file import Text, YamlFile, is_null, line_of
 from msgflow.text.name_suggestions import meant_or, nearest
 from msgflow.verify.condition import Condition, ConditionError, parse_condition
 from msgflow.verify.metrics import ENDS, PATH, SUBJECTS
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 _EXAMPLE = "targets: [{path: [/scan, /cmd_vel], latency: p99 < 80 ms}]"
 _QUOTING = 'quote conditions that begin with >, and patterns that begin with *: ">= 99 %"'

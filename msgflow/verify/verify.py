@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cache
@@ -26,8 +27,6 @@ from msgflow.verify.metrics import ENDS, PATH, SUBJECTS
 from msgflow.verify.worst_case import KEYS, LOST_FLOW, find_worst_case, worst_case_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
     import duckdb
 
     from msgflow.run.choice import Run

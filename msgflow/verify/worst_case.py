@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from msgflow.sql.statement import internal_sql
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import duckdb
 
     from msgflow.run.window import Window

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
@@ -16,8 +17,6 @@ from msgflow.view.pages import Pages, critical_path
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import duckdb
 
     from msgflow.run.choice import Run

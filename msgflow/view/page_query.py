@@ -9,6 +9,7 @@ begin of the run. They have the same headers, and read the public views alone. A
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,8 +24,6 @@ from msgflow.run.window import WHOLE, Window
 from msgflow.sql.statement import Statements
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Container, Mapping
-
     import pyarrow as pa
 
     from msgflow.run.choice import Run

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections import OrderedDict
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
@@ -35,8 +36,6 @@ from msgflow.view.summary import (
 from msgflow.view.table_encoding import encode, encode_result
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
-
     import duckdb
 
     from msgflow.result.query_result import QueryResult

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gzip
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -33,8 +34,6 @@ from msgflow.view.summary_markdown import markdown
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import duckdb
 
     from msgflow.query.compare import Comparison

@@ -16,8 +16,10 @@ import os
 import re
 import socket
 import threading
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import urlsplit
 
@@ -39,9 +41,6 @@ from msgflow.view.shared_database import ReplacedError, SharedDatabase, Unopened
 from msgflow.view.sql_page import Sql, encoded_error, encoded_rows, most_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
     from starlette.requests import Request
     from starlette.types import ASGIApp, Receive, Scope, Send
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 import hashlib
 import threading
 import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import duckdb
 
@@ -20,10 +22,6 @@ from msgflow.db.memory import default_limit
 from msgflow.errors import DatabaseError, DatabaseInUseError, MsgflowError, QueryError
 from msgflow.version import __version__
 from msgflow.view.pages import Pages
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 # More than the questions of one page are apart, less than it takes to type a command.
 SECONDS_UNTIL_FREE = 3.0

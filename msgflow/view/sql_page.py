@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
 import pyarrow as pa
@@ -14,8 +15,6 @@ from msgflow.text.json_value import json_text, json_value
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import duckdb
 
     from msgflow.result.query_result import QueryResult

@@ -6,6 +6,7 @@ the command line have the same numbers.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -23,8 +24,6 @@ from msgflow.text.shell import shell_joined
 from msgflow.view.table_encoding import encode_result
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from msgflow.query.compare import Comparison
     from msgflow.sql.value import Value
     from msgflow.verify.verify import Verification

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
@@ -11,8 +12,6 @@ from msgflow.text.shell import shell_joined
 from msgflow.text.values import format_cell
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     from msgflow.db.finding import Finding
     from msgflow.run.choice import Run
     from msgflow.view.summary import Section

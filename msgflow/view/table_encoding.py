@@ -12,6 +12,7 @@ would turn round what stands behind it on the page.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,8 +23,6 @@ from msgflow.text.values import printable
 from msgflow.trace.numpy_arrow import is_valid, to_numpy
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from msgflow.result.query_result import QueryResult
 
 LARGEST_EXACT = 2**53

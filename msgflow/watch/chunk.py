@@ -5,15 +5,12 @@ from __future__ import annotations
 import os
 import re
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 _ARCHIVES = "archives"
 # Begin, end, number; see "Session rotation" of lttng-rotate(1).

@@ -6,9 +6,11 @@ import os
 import shutil
 import stat
 import time
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import KW_ONLY, dataclass
 from itertools import count
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import MsgflowError
@@ -16,10 +18,6 @@ from msgflow.ingest import ingest
 from msgflow.watch.learned_answers import LEARNED_FILE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from concurrent.futures import Future
-    from pathlib import Path
-
     from msgflow.links.links_file import LinksFile
     from msgflow.watch.kept_traces import KeptTraces
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
@@ -12,9 +14,6 @@ from msgflow.watch.arrivals import PATIENCE, Arrivals, by_arrival
 from msgflow.watch.chunk import ChunkFinder, finished_chunks
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
     from msgflow.watch.chunk import Chunk
     from msgflow.watch.watcher import Watcher
     from msgflow.watch.window_report import WindowReport

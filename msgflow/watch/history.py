@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,9 +12,6 @@ from msgflow.run.window import Window
 from msgflow.watch.kept_traces import KeptTraces
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
-    from pathlib import Path
-
     from msgflow.watch.kept_chunk import KeptChunk
 
 # One takes up to two kilobytes of memory while it is analysed.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,8 +14,6 @@ from msgflow.trace.numpy_arrow import to_numpy
 from msgflow.watch.kept_chunk import joined, placed, with_column
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import pyarrow as pa
 
     from msgflow.trace import TraceInfo

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
+from collections.abc import Iterator
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -15,8 +16,6 @@ from msgflow.sql.statement import registered
 from msgflow.watch.window_report import discarded_events
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     import duckdb
     from prometheus_client.metrics_core import Metric
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,8 +15,6 @@ from msgflow.record.session import rotated
 from msgflow.text.name_suggestions import did_you_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from msgflow.record.lttng import Session
 
 # Seconds between two looks which sessions are there.

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.clocks.clocks_file import ClockSync
@@ -19,9 +21,6 @@ from msgflow.watch.learned_answers import LearnedAnswers, with_learned
 from msgflow.watch.window_report import report_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
-
     from msgflow.links.links_file import DeclaredLink, LinksFile
     from msgflow.watch.alarm import Alarm
     from msgflow.watch.chunk import Chunk

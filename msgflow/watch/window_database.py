@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from pathlib import Path
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -11,8 +12,6 @@ from msgflow.db import empty_database
 from msgflow.ingest import ingest
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from msgflow.links.links_file import LinksFile
     from msgflow.watch.kept_traces import KeptTraces
 

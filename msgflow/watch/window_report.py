@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +14,6 @@ from msgflow.run.slice import Slice
 from msgflow.text.json_value import json_value
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import duckdb
 
     from msgflow.run.window import Window

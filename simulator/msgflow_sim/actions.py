@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
@@ -24,8 +25,6 @@ from msgflow_sim.services import ClientObject, ServiceObject, answer, call
 from msgflow_sim.take import take
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
     from msgflow_sim.entity import Action
     from msgflow_sim.executor import Executor
     from msgflow_sim.executor_thread import ExecutorThread

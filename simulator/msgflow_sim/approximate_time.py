@@ -7,11 +7,9 @@ that are long enough: no limits, and a penalty of a tenth for sets that end late
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Generic, TypeVar
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
 # An end that is later by 10 has to save 11 at the start.

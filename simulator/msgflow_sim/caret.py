@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from msgflow_sim.machine import Thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from msgflow_sim.machine import RunningProcess
     from msgflow_sim.objects import Message, SubscriptionObject
 

@@ -5,6 +5,7 @@ What DDS and the middleware layer do for each is in `Creator` too.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -36,8 +37,6 @@ from msgflow_sim.rmw import entity_of
 from msgflow_sim.services import ClientObject, ServiceNetwork, ServiceObject
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-
     from msgflow_sim import system
     from msgflow_sim.discovery import Discovery
     from msgflow_sim.machine import Thread

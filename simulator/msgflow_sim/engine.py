@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -32,8 +33,6 @@ from msgflow_sim.transport import Middleware
 from msgflow_sim.truth import Truth
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
     from msgflow_sim.layout import Layout
     from msgflow_sim.recording import Recording
     from msgflow_sim.system import Host, Scenario

@@ -7,15 +7,11 @@ case nothing is written.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
 
 _BYTE = "integer { size = 8; align = 8; signed = 0; encoding = none; base = 10; }"
 _POINTER = "integer { size = 64; align = 8; signed = 0; encoding = none; base = 16; }"

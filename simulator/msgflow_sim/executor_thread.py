@@ -5,6 +5,7 @@ The loop: get_next_ready; if there was nothing wait_for_work and get_next_ready 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from msgflow_sim.callbacks import run_buffer, run_subscription, run_timer
@@ -15,8 +16,6 @@ from msgflow_sim.objects import IntraBuffer, SubscriptionObject, TimerObject
 from msgflow_sim.services import ClientObject, ServiceObject, run_client, run_service
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
     from msgflow_sim.executor import Entity, Executor
     from msgflow_sim.transport import Middleware
 

@@ -6,6 +6,7 @@ Threads that run there meanwhile have the CPU, but do not compute.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from operator import attrgetter
@@ -14,8 +15,6 @@ from typing import TYPE_CHECKING
 from msgflow_sim.kernel import INTERRUPT, SOFTIRQ
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
     from msgflow_sim.kernel import Run
 
 # From the begin until a thread is woken, and from there until the end.

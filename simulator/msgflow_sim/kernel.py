@@ -7,12 +7,11 @@ CPU, one with an equal priority after a slice of time. What happened is kept.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from msgflow_sim import system
 
 TIMER, INTERRUPT, SOFTIRQ, THREAD = "timer", "interrupt", "softirq", "thread"

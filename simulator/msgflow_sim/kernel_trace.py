@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from itertools import pairwise
 from operator import attrgetter
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 from uuid import UUID
 
@@ -16,9 +18,6 @@ from msgflow_sim.kernel import INTERRUPT, SOFTIRQ, TIMER
 from msgflow_sim.layout import EventType, Layout
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from pathlib import Path
-
     from msgflow_sim.ctf import TraceIdentity
     from msgflow_sim.host_clock import HostClock
     from msgflow_sim.interrupts import Interrupt

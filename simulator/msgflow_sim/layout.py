@@ -7,15 +7,12 @@ implementation have its `dds:*` events as well, which only forks of Fast DDS and
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from msgflow_sim.events import OWN_SIGNATURES, SIGNATURES, EventField, parse_fields
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _LARGE_PACKET = 32 * 1024
 _SMALL_PACKET = 8 * 1024

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -10,8 +11,6 @@ from msgflow_sim.approximate_time import ApproximateTime
 from msgflow_sim.callback_instance import CallbackInstance, Cause
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
     from msgflow_sim.entity import MessageLink
     from msgflow_sim.system import Node
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from random import Random
 from typing import TYPE_CHECKING
 
@@ -10,8 +10,6 @@ from msgflow_sim.ctf import thread_context
 from msgflow_sim.kernel import TIMER
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from msgflow_sim import system
     from msgflow_sim.host_clock import HostClock
     from msgflow_sim.kernel import Kernel

@@ -7,14 +7,13 @@ They refer to each other; what happens to them lies above: `transport`, `publica
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from msgflow_sim.callback_instance import origins_on
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
     from msgflow_sim.callback_instance import CallbackInstance, Origin
     from msgflow_sim.entity import Publisher, Subscription, Work
     from msgflow_sim.executor import CallbackGroup, Executor

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from hashlib import sha256
 from itertools import chain
+from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING
 from uuid import UUID
@@ -24,9 +26,6 @@ from msgflow_sim.kernel_trace import write_kernel
 from msgflow_sim.recording import Buffers, Recording
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-    from pathlib import Path
-
     from msgflow_sim.host_clock import HostClock
     from msgflow_sim.kernel import Kernel
     from msgflow_sim.layout import Layout

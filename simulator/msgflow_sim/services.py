@@ -7,6 +7,7 @@ user's code without a callback that is traced.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -17,8 +18,6 @@ from msgflow_sim.machine import Run, settle
 from msgflow_sim.user_code import execute
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from msgflow_sim.executor import CallbackGroup, Executor
     from msgflow_sim.machine import RunningProcess, Steps, Thread
     from msgflow_sim.objects import UserCode

@@ -5,6 +5,7 @@ The steps are separate, so that other processes start meanwhile.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -21,8 +22,6 @@ from msgflow_sim.publication import publish
 from msgflow_sim.user_thread import UserThread
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from msgflow_sim.machine import RunningProcess, Steps
     from msgflow_sim.objects import PublisherObject
     from msgflow_sim.services import ServiceNetwork

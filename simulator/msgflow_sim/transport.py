@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict, deque
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from msgflow_sim.caret import DataListener
@@ -10,8 +11,6 @@ from msgflow_sim.latency import AGNOCAST, AT_ONCE, latency_between
 from msgflow_sim.objects import Match
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from msgflow_sim.machine import Machine, RunningProcess
     from msgflow_sim.objects import Message, PublisherObject, RingBuffer, SubscriptionObject
     from msgflow_sim.scheduler import Scheduler

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,8 +14,6 @@ from msgflow_sim.machine import settle
 from msgflow_sim.publication import publish
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from msgflow_sim.callback_instance import CallbackInstance
     from msgflow_sim.links import CallbackLinks
     from msgflow_sim.machine import Run, Steps, Thread

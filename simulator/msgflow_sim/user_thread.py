@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from msgflow_sim.machine import RunningProcess, Steps, Thread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from msgflow_sim.creation import Creator, NodeContext
     from msgflow_sim.entity import Subscription
     from msgflow_sim.objects import SubscriptionObject

@@ -6,9 +6,9 @@ import os
 import re
 import select
 import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Thread
-from typing import TYPE_CHECKING
 
 try:
     import termios
@@ -16,8 +16,6 @@ try:
 except ImportError:  # Windows has no such terminals
     termios = None  # type: ignore[assignment]
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 # What terminals send: of a key that is held, several times at once.
 _KEY = re.compile(r"\x1b[\[O][\d;]*[A-Za-z~]|.", re.DOTALL)

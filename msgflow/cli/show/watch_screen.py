@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Iterable
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +19,6 @@ from msgflow.text.values import NULL, count, format_duration, printable
 from msgflow.watch.alarm import violation_line
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
     from rich.console import Console, RenderableType
 
     from msgflow.watch.window_report import WindowReport

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +21,6 @@ from msgflow.trace.numpy_arrow import integers_to_arrow
 from msgflow.trace.prefetch import prefetched
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
     from msgflow.trace.ctf.event_order import Batch
     from msgflow.trace.ctf.field_reader import EventReader
     from msgflow.trace.ctf.packet_order import Entry, PacketEvents

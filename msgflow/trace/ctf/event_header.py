@@ -6,6 +6,7 @@ tells which one and, in the short form, the id as well.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,8 +15,6 @@ from msgflow.trace.ctf.field_types import BYTE, Role, Scope
 from msgflow.trace.ctf.layout import DynamicError, Leaf, lay_out
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from msgflow.trace.ctf.declarations import StreamClass
 
 

@@ -7,6 +7,7 @@ large ones are cut into pieces that are read like packets.
 from __future__ import annotations
 
 import heapq
+from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from typing import TYPE_CHECKING
@@ -20,8 +21,6 @@ from msgflow.trace.ctf.stream_layout import GAP
 from msgflow.trace.numpy_arrow import distinct
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Generator, Iterator, Sequence
-
     from numpy.typing import NDArray
 
     from msgflow.trace.ctf.packet_memory import Memory

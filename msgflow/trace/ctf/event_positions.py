@@ -11,6 +11,7 @@ alone.
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,8 +20,6 @@ import numpy as np
 from msgflow.trace.ctf.field_types import FieldError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
     from msgflow.trace.ctf.packet_memory import Memory

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,8 +11,6 @@ from msgflow.trace.ctf.event_body import EventBody, Kind
 from msgflow.trace.numpy_arrow import distinct
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from numpy.typing import NDArray
 
     from msgflow.trace.ctf.layout import OptionLayout, Part, VariantLayout

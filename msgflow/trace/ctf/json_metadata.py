@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from uuid import UUID
 
 from msgflow.trace.ctf import field_types as ctf
@@ -19,9 +20,6 @@ from msgflow.trace.ctf.field_types import (
     integer_of,
     may_have,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 _SEPARATOR = "\x1e"
 # Larger than any number that makes sense, and short enough for a message.

@@ -8,15 +8,12 @@ variants of many events are read at once.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, TypeGuard
+from typing import Literal, TypeGuard
 
 from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.field_types import BYTE, FieldError, aligned
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
-
 
 _MOST_STEPS = 100_000
 _WIDTHS = {8, 16, 32, 64}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
@@ -10,8 +11,6 @@ from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.metadata_frame import MetadataKind, text_of
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from msgflow.trace.ctf.declarations import TraceClass
 
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 import struct
 from collections import Counter
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 
 from msgflow.trace.regular_file import UnsuitableFileError, read_regular
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 DIRECTORY: Final = "index"
 """Name of the directory beside the streams that has the indexes."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf import packet_index
@@ -13,9 +15,6 @@ from msgflow.trace.ctf.field_types import BYTE, FieldError
 from msgflow.trace.regular_file import UnsuitableFileError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-    from pathlib import Path
-
     from msgflow.trace.ctf.packet_header import HeaderReader, PacketHeader
     from msgflow.trace.ctf.stream_layout import StreamLayout
 

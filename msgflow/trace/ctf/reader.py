@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
@@ -26,9 +28,6 @@ from msgflow.trace.time_base import on_one_base
 from msgflow.trace.trace_set import TraceSet
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
     from msgflow.trace.archived_traces import Unpacked
     from msgflow.trace.ctf.losses import Continuation
     from msgflow.trace.ctf.packet_order import Entry

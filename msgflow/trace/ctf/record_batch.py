@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -22,8 +23,6 @@ from msgflow.trace.ctf.field_types import Scope, Structure
 from msgflow.trace.numpy_arrow import texts_to_arrow, to_arrow, to_numpy
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-
     from numpy.typing import NDArray
 
     from msgflow.trace.ctf.event_order import Batch

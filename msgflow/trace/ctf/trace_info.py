@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
@@ -10,9 +12,6 @@ from msgflow.trace.ctf.packet_times import end_of
 from msgflow.trace.model import TraceInfo
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence, Set
-    from pathlib import Path
-
     from msgflow.trace.ctf.clock import Clock
     from msgflow.trace.ctf.declarations import TraceClass
     from msgflow.trace.ctf.field_types import Structure

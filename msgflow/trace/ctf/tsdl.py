@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 from uuid import UUID
 
 from msgflow.trace.ctf import field_types as ctf
@@ -19,9 +19,6 @@ from msgflow.trace.ctf.field_types import (
 )
 from msgflow.trace.ctf.tsdl_tokens import Token, tokens_of
 from msgflow.trace.ctf.tsdl_types import TypeParser, Value, without_prefix
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _ROLES: Mapping[Scope, Mapping[str, str]] = {
     Scope.PACKET_HEADER: {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,8 +11,6 @@ from msgflow.trace.ctf.field_types import BYTE, MetadataError, Reference, Scope,
 from msgflow.trace.ctf.tsdl_tokens import TokenStream
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from msgflow.trace.ctf.tsdl_tokens import Token
 
 Labels = dict[str, tuple[tuple[int, int], ...]]

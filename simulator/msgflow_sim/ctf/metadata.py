@@ -6,15 +6,14 @@ our traces meet what they meet in recorded ones.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from struct import Struct
 from typing import TYPE_CHECKING
+from uuid import UUID
 
 from msgflow_sim.events import EventField, FieldKind
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from uuid import UUID
-
     from msgflow_sim.layout import EventType, Layout
 
 _PACKET_BYTES = 4096

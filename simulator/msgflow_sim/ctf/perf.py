@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from hashlib import sha256
+from pathlib import Path
 from struct import Struct
 from typing import TYPE_CHECKING
 from uuid import UUID
@@ -12,9 +14,6 @@ from msgflow_sim.ctf.tracepoint import Tracepoint
 from msgflow_sim.events import FieldKind
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
     from msgflow_sim.ctf.trace import TraceIdentity
     from msgflow_sim.events import EventField
 

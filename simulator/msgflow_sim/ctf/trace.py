@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING
+from uuid import UUID
 
 from msgflow_sim.ctf.metadata import metadata_text, packets
 from msgflow_sim.ctf.stream import Break, Ending, Faults, StreamWriter
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
-    from uuid import UUID
-
     from msgflow_sim.layout import Layout
 
 USER_ID = 1000

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from operator import itemgetter
 from struct import Struct
-from typing import TYPE_CHECKING
 
 from msgflow_sim.events import EventField, FieldKind
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
 
 _CONTEXT = Struct("<ii17s")
 CONTEXT_SIZE = _CONTEXT.size

@@ -5,6 +5,7 @@ Each module has those that show one idea.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -36,8 +37,6 @@ from msgflow_sim.scenario import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from msgflow_sim.system import Scenario
 
 
