@@ -7,7 +7,8 @@ Nothing here imports pyarrow before a trace is opened.
 from msgflow.trace.ctf.losses import Continuation
 from msgflow.trace.discovery import discover
 from msgflow.trace.model import PACKET, Damage, EventBatch, Progress, TraceInfo, TraceLocation
-from msgflow.trace.trace_set import TraceSet, open
+from msgflow.trace.reader_choice import open
+from msgflow.trace.trace_set import TraceSet
 
 __all__ = [
     "PACKET",

@@ -1,30 +1,27 @@
-"""Sets of traces: opened by a reader of choice, and what every reader of them does."""
+"""Sets of traces: what every reader of them does, one iteration at a time."""
 
 from __future__ import annotations
 
 import contextlib
 import weakref
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.trace.archive import is_archive, shown
-from msgflow.trace.discovery import discover
+from msgflow.trace import archive
 from msgflow.trace.model import Progress
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
     from msgflow.trace.archived_traces import Unpacked
-    from msgflow.trace.ctf.losses import Continuation
-    from msgflow.trace.model import Damage, EventBatch, TraceInfo, TraceLocation
+    from msgflow.trace.model import Damage, EventBatch, TraceInfo
 
     Wanted = Mapping[str, pa.Schema | None] | None
     Batches = Generator[EventBatch, None, None]
 
-READERS = ("auto", "msgflow", "bt2")
 DEFAULT_BATCH_ROWS = 65_536
 
 Report = Callable[[Progress], None]
@@ -110,7 +107,7 @@ class TraceSet(ABC):
 
     def shown(self, path: Path) -> Path:
         """Return a path as the user knows it: within an archive, that of the archive first."""
-        return shown(path, self.unpacked) or path
+        return archive.shown(path, self.unpacked) or path
 
     def _explained(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
         """Read everything; errors name what the user knows."""
@@ -129,57 +126,3 @@ class TraceSet(ABC):
 
     def _under_way(self) -> Batches | None:
         return None if self._running is None else self._running()
-
-
-def open(
-    paths: Sequence[str | Path],
-    *,
-    reader: str = "auto",
-    strict: bool = False,
-    after: Continuation | None = None,
-) -> TraceSet:
-    """Open all traces below `paths` as one set.
-
-    Paths are CTF directories, directories above such, or archives of such (.tar, also with .gz, .xz
-    or .zst, and .zip). Archives are unpacked to the temporary directory (TMPDIR) until the set is
-    closed. The reader is 'msgflow' (its own decoder), 'bt2' (Babeltrace 2's Python bindings, which
-    end at the first damage), or 'auto', which is 'msgflow'. `strict` ends at the first damage.
-    `after` has the parts of the same recordings that were read before; it takes in these, which can
-    be read only once then. Only msgflow's own decoder can go on like this.
-
-    Raises:
-        TraceError: there is no readable trace below a path, an archive cannot be unpacked, or
-            the reader is not installed.
-        UsageError: there is no reader of that name.
-    """
-    if reader not in READERS:
-        raise UsageError(f"there is no reader {reader!r}", hint=f"use one of {', '.join(READERS)}")
-    if not any(is_archive(Path(path)) for path in paths):
-        return _open(discover(paths), None, reader, strict, after)
-    from msgflow.trace.archived_traces import Unpacked
-
-    unpacked = Unpacked(paths)
-    try:
-        with unpacked.explained():
-            locations = discover(unpacked.paths)
-            locations.sort(key=lambda at: shown(at.path, unpacked.archives) or at.path)
-            return _open(locations, unpacked, reader, strict, after)
-    except BaseException:
-        unpacked.remove()
-        raise
-
-
-def _open(
-    locations: Sequence[TraceLocation],
-    archives: Unpacked | None,
-    reader: str,
-    strict: bool,
-    after: Continuation | None,
-) -> TraceSet:
-    if reader == "bt2":
-        from msgflow.trace.bt2_reader import Bt2TraceSet
-
-        return Bt2TraceSet(locations, archives)
-    from msgflow.trace.ctf.reader import CtfTraceSet
-
-    return CtfTraceSet(locations, archives=archives, strict=strict, after=after)

@@ -1,0 +1,73 @@
+"""Choice of the reader of traces by name; finds the traces and unpacks archives first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from msgflow.errors import UsageError
+from msgflow.trace.archive import is_archive, shown
+from msgflow.trace.discovery import discover
+
+if TYPE_CHECKING:
+    from msgflow.trace.archived_traces import Unpacked
+    from msgflow.trace.ctf.losses import Continuation
+    from msgflow.trace.model import TraceLocation
+    from msgflow.trace.trace_set import TraceSet
+
+READERS = ("auto", "msgflow", "bt2")
+
+
+def open(
+    paths: Sequence[str | Path],
+    *,
+    reader: str = "auto",
+    strict: bool = False,
+    after: Continuation | None = None,
+) -> TraceSet:
+    """Open all traces below `paths` as one set.
+
+    Paths are CTF directories, directories above such, or archives of such (.tar, also with .gz, .xz
+    or .zst, and .zip). Archives are unpacked to the temporary directory (TMPDIR) until the set is
+    closed. The reader is 'msgflow' (its own decoder), 'bt2' (Babeltrace 2's Python bindings, which
+    end at the first damage), or 'auto', which is 'msgflow'. `strict` ends at the first damage.
+    `after` has the parts of the same recordings that were read before; it takes in these, which can
+    be read only once then. Only msgflow's own decoder can go on like this.
+
+    Raises:
+        TraceError: there is no readable trace below a path, an archive cannot be unpacked, or
+            the reader is not installed.
+        UsageError: there is no reader of that name.
+    """
+    if reader not in READERS:
+        raise UsageError(f"there is no reader {reader!r}", hint=f"use one of {', '.join(READERS)}")
+    if not any(is_archive(Path(path)) for path in paths):
+        return _open(discover(paths), None, reader, strict, after)
+    from msgflow.trace.archived_traces import Unpacked
+
+    unpacked = Unpacked(paths)
+    try:
+        with unpacked.explained():
+            locations = discover(unpacked.paths)
+            locations.sort(key=lambda at: shown(at.path, unpacked.archives) or at.path)
+            return _open(locations, unpacked, reader, strict, after)
+    except BaseException:
+        unpacked.remove()
+        raise
+
+
+def _open(
+    locations: Sequence[TraceLocation],
+    archives: Unpacked | None,
+    reader: str,
+    strict: bool,
+    after: Continuation | None,
+) -> TraceSet:
+    if reader == "bt2":
+        from msgflow.trace.bt2_reader import Bt2TraceSet
+
+        return Bt2TraceSet(locations, archives)
+    from msgflow.trace.ctf.reader import CtfTraceSet
+
+    return CtfTraceSet(locations, archives=archives, strict=strict, after=after)
