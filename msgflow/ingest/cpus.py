@@ -3,8 +3,7 @@
 Only a reader has all events in hand in their total order: to find out in SQL what ran on a CPU
 would sort the largest tables there are. Interrupts are not staged one event by the other, as there
 are many of them: a waking says in which one it came, and those that interrupted a thread are rows
-of `INTERRUPT_SCHEMA`. Nor are the contexts of switches, which say what ids the thread that leaves a
-CPU has in its PID namespace: they are rows of `KERNEL_THREAD_SCHEMA`, one per round.
+of `INTERRUPT_SCHEMA`.
 """
 
 from __future__ import annotations
@@ -38,22 +37,6 @@ INTERRUPT_SCHEMA = pa.schema(
     ]
 )
 """Interrupts that were handled while a thread had the CPU: begin, end, and the thread."""
-
-KERNEL_THREAD = "kernel_thread"
-"""Table of `raw` with the rows of `KERNEL_THREAD_SCHEMA`."""
-
-KERNEL_THREAD_SCHEMA = pa.schema(
-    [
-        pa.field("trace_index", pa.int32()),
-        pa.field("tid", pa.int32()),
-        pa.field("vpid", pa.int32()),
-        pa.field("vtid", pa.int32()),
-        pa.field("pid_ns", pa.int64()),
-        pa.field("first_ns", pa.int64()),
-        pa.field("last_ns", pa.int64()),
-    ]
-)
-"""Ids of threads to the kernel and in their PID namespace: first and last time in a round."""
 
 _SWITCH = ("event_id", "ts_ns", "tid", "number")
 _HANDLING = ("event_id", "ts_ns", "is_open")
@@ -105,7 +88,6 @@ class Cpus:
                         "switch_number": to_arrow(events["number"][at]),
                     }
                     placed.append((tracepoint.table, _staged(tracepoint, batch, found)))
-                    placed += _kernel_threads(batch)
                 case CpuRole.WAKING:
                     before = switch["event_id"][at]
                     found = {
@@ -169,21 +151,6 @@ class Cpus:
             ],
             schema=INTERRUPT_SCHEMA,
         )
-
-
-def _kernel_threads(switches: pa.RecordBatch) -> list[tuple[str, pa.RecordBatch]]:
-    """Return the threads that leave a CPU, where switches have contexts; a dead one has no ids."""
-    is_known = (to_numpy(switches["vtid"]) > 0) & (to_numpy(switches["prev_tid"]) > 0)
-    if not is_known.any():
-        return []
-    ids = ["trace_index", "prev_tid", "vpid", "vtid", "pid_ns"]
-    known = pa.Table.from_batches([switches.select([*ids, "ts_ns"])]).filter(pa.array(is_known))
-    found = known.group_by(ids, use_threads=False).aggregate([("ts_ns", "min"), ("ts_ns", "max")])
-    named = found.select([*ids, "ts_ns_min", "ts_ns_max"]).rename_columns(
-        KERNEL_THREAD_SCHEMA.names
-    )
-    rows = named.cast(KERNEL_THREAD_SCHEMA).combine_chunks()
-    return [(KERNEL_THREAD, batch) for batch in rows.to_batches()]
 
 
 def _staged(
