@@ -280,8 +280,8 @@ CREATE TABLE staging.thread_state (number BIGINT, thread_id BIGINT, start_ns BIG
 CREATE TABLE staging.thread_switch (thread_id BIGINT, tid INTEGER, trace_index INTEGER,
     event_id BIGINT, at_ns BIGINT, cpu INTEGER, is_on BOOLEAN, unseen_since_ns BIGINT,
     priority INTEGER, prev_state BIGINT);
-CREATE TABLE staging.thread_tid (thread_id BIGINT, clock_key VARCHAR, tid INTEGER, source VARCHAR,
-    from_ns BIGINT, until_ns BIGINT);
+CREATE TABLE staging.thread_tid (thread_id BIGINT, clock_key VARCHAR, tid INTEGER, from_ns BIGINT,
+    until_ns BIGINT);
 CREATE TABLE staging.thread_waking (thread_id BIGINT, tid INTEGER, event_id BIGINT, at_ns BIGINT,
     kind VARCHAR, clock_key VARCHAR, target_cpu INTEGER, waker_tid INTEGER, waker_name VARCHAR);
 CREATE TABLE staging.timer (timer_id BIGINT, process_id BIGINT, node_id BIGINT, period_ns BIGINT,

@@ -16,9 +16,6 @@ CREATE TABLE raw.cpu_return (thread_index INTEGER, event_id BIGINT);
 -- Interrupts, each with the thread that it interrupted.
 CREATE TABLE raw.interrupt (trace_index INTEGER, kind ENUM('interrupt', 'softirq', 'timer'),
     start_ns BIGINT, end_ns BIGINT, tid INTEGER);
--- Ids of threads to the kernel and in their PID namespace, as contexts of switches have them.
-CREATE TABLE raw.kernel_thread (trace_index INTEGER, tid INTEGER, vpid INTEGER, vtid INTEGER,
-    pid_ns BIGINT, first_ns BIGINT, last_ns BIGINT);
 -- Lines of `perf script`.
 CREATE TABLE raw.stack_sample (hostname VARCHAR, is_monotonic BOOLEAN, head VARCHAR,
     stack VARCHAR);

@@ -3,8 +3,7 @@
 Only a reader has all events in hand in their total order: to find out in SQL what ran on a CPU
 would sort the largest tables there are. Interrupts are not staged one event by the other, as there
 are many of them: a waking says in which one it came, and those that interrupted a thread are rows
-of `raw.interrupt`. Nor are the contexts of switches, which say what ids the thread that leaves a
-CPU has in its PID namespace: they are rows of `raw.kernel_thread`, one per round.
+of `raw.interrupt`.
 """
 
 from __future__ import annotations
@@ -24,10 +23,8 @@ if TYPE_CHECKING:
 
     from msgflow.ingest.catalogue import Catalogue, Tracepoint
 
-# Tables of `raw`: interrupts that were handled while a thread had the CPU, and ids of threads to
-# the kernel and in their PID namespace, with the first and last time in a round.
+# Table of `raw`: interrupts that were handled while a thread had the CPU.
 INTERRUPT = "interrupt"
-KERNEL_THREAD = "kernel_thread"
 
 _SWITCH = ("event_id", "ts_ns", "tid", "number")
 _HANDLING = ("event_id", "ts_ns", "is_open")
@@ -79,7 +76,6 @@ class Cpus:
                         "switch_number": to_arrow(events["number"][at]),
                     }
                     placed.append((tracepoint.table, _staged(tracepoint, batch, found)))
-                    placed += _kernel_threads(batch)
                 case CpuRole.WAKING:
                     before = switch["event_id"][at]
                     found = {
@@ -142,18 +138,6 @@ class Cpus:
                 "tid": to_arrow(tids[chosen].astype(np.int32)),
             }
         )
-
-
-def _kernel_threads(switches: pa.RecordBatch) -> list[tuple[str, pa.RecordBatch]]:
-    """Return the threads that leave a CPU, where switches have contexts; a dead one has no ids."""
-    is_known = (to_numpy(switches["vtid"]) > 0) & (to_numpy(switches["prev_tid"]) > 0)
-    if not is_known.any():
-        return []
-    ids = ["trace_index", "prev_tid", "vpid", "vtid", "pid_ns"]
-    known = pa.Table.from_batches([switches.select([*ids, "ts_ns"])]).filter(pa.array(is_known))
-    found = known.group_by(ids, use_threads=False).aggregate([("ts_ns", "min"), ("ts_ns", "max")])
-    rows = found.select([*ids, "ts_ns_min", "ts_ns_max"]).combine_chunks()
-    return [(KERNEL_THREAD, batch) for batch in rows.to_batches()]
 
 
 def _staged(

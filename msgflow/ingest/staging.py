@@ -73,7 +73,7 @@ def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
 
 def empty(con: duckdb.DuckDBPyConnection) -> None:
     """Empty `raw`, to read everything again."""
-    others = ("packet", "thread", "thread_name", "cpu_return", "interrupt", "kernel_thread")
+    others = ("packet", "thread", "thread_name", "cpu_return", "interrupt")
     for table in (*event_tables(), *others):
         con.execute(f"TRUNCATE raw.{table}")
 

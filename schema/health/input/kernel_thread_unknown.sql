@@ -1,10 +1,8 @@
 -- title: Threads are not known to the kernel trace
 -- description: Which of the kernel's threads these threads of ROS processes are is not known. There
 --     are no states of them.
--- cause: They had no event while the kernel was traced, and the kernel trace has neither contexts
---     (vpid, vtid, pid_ns) of their switches, nor a state dump, nor their creation.
--- cure: Record the kernel for as long as the ROS system, with these contexts, or with the state
---     dump (docs/scheduling.md).
+-- cause: They had no event while the kernel was traced.
+-- cure: Record the kernel for as long as the ROS system (docs/scheduling.md).
 -- grain: one row per process
 -- severity: info
 -- when: staging.schedule
