@@ -67,6 +67,8 @@ ARGUMENTS = {
     "parts": ["'same_parts'"],
     "vertices": ["'same_vertices'"],
     "intervals": ["'same_intervals'"],
+    "waited": ["'same_waits'"],
+    "of_samples": ["'same_samples'"],
     # Of executor_activity_within: everything, and a window.
     "window_start_ns": ["NULL", "(SELECT quantile_disc(start_ns, 0.3) FROM main.publication)"],
     "window_end_ns": ["NULL", "(SELECT quantile_disc(start_ns, 0.6) FROM main.publication)"],
@@ -80,6 +82,8 @@ TABLES = {
     "same_parts": "main.end_to_end_part([1], flow_case := 'every_pair', most_flows := 3)",
     "same_intervals": "(SELECT callback_instance_id AS interval_id, thread_id, start_ns AS from_ns,"
     " end_ns AS to_ns FROM main.callback_instance WHERE end_ns IS NOT NULL)",
+    "same_waits": "main.executor_wait_explained([1])",
+    "same_samples": "(SELECT run_id AS group_id, stack_id, cpu_ns FROM main.stack_sample)",
     "same_vertices": "(SELECT 0 AS key, 'take' AS kind, take_id AS id, 0 AS depth FROM main.take)",
 }
 ROWS_SHOWN = 3

@@ -31,7 +31,12 @@
 WITH delivery AS (
     SELECT
         d.subscription_id, count(*) AS published,
-        histogram(d.status)::MAP(VARCHAR, BIGINT) AS number,
+        count(*) FILTER (WHERE d.status = 'delivered') AS delivered,
+        count(*) FILTER (WHERE d.status = 'dropped') AS dropped,
+        count(*) FILTER (WHERE d.status = 'lost') AS lost,
+        count(*) FILTER (WHERE d.status = 'not_connected') AS not_connected,
+        count(*) FILTER (WHERE d.status = 'cut_by_recording') AS cut_by_recording,
+        count(*) FILTER (WHERE d.status = 'unknown') AS unknown,
         main.counts_text(d.reason) AS reasons
     FROM main.stat_delivery AS d
     JOIN main.publication AS b ON d.publication_id = b.publication_id
@@ -50,12 +55,12 @@ SELECT
     s.run_id, s.topic_name,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
     coalesce(d.published, 0) AS published,
-    coalesce(d.number['delivered'], 0) AS delivered,
-    coalesce(d.number['dropped'], 0) AS dropped,
-    coalesce(d.number['lost'], 0) AS lost,
-    coalesce(d.number['not_connected'], 0) AS not_connected,
-    coalesce(d.number['cut_by_recording'], 0) AS cut_by_recording,
-    coalesce(d.number['unknown'], 0) AS unknown,
+    coalesce(d.delivered, 0) AS delivered,
+    coalesce(d.dropped, 0) AS dropped,
+    coalesce(d.lost, 0) AS lost,
+    coalesce(d.not_connected, 0) AS not_connected,
+    coalesce(d.cut_by_recording, 0) AS cut_by_recording,
+    coalesce(d.unknown, 0) AS unknown,
     100 * delivered / nullif(delivered + dropped + lost, 0) AS delivered_percent,
     100 * lost / nullif(delivered + dropped + lost, 0) AS lost_percent,
     coalesce(o.orphans, 0) AS orphans,

@@ -1,18 +1,18 @@
 -- description: What ran while callbacks waited: the three with the largest share, with their node
 --     if it is another one. Callbacks that answers count as one (main.callback_alike) are one.
 -- grain: one row per callback that waited while others ran
--- param: waits VARCHAR  Name of waits: a table, or a part of the query, with callback_id, and
+-- param: waited VARCHAR  Name of waits: a table, or a part of the query, with callback_id, and
 --     meanwhile_callback_ids and meanwhile_ns of main.executor_wait_explained
 -- column: callback_id BIGINT  Callback that waited
 -- column: shares VARCHAR  What ran, the largest first
-CREATE OR REPLACE MACRO main.meanwhile_share(waits) AS TABLE
+CREATE OR REPLACE MACRO main.meanwhile_share(waited) AS TABLE
 WITH pair AS (
     SELECT r.callback_id, k.alike_id AS meanwhile_id, sum(r.overlap_ns) AS overlap_ns
     FROM (
         SELECT
             callback_id, unnest(meanwhile_callback_ids) AS meanwhile_id,
             unnest(meanwhile_ns) AS overlap_ns
-        FROM query_table(waits)
+        FROM query_table(waited)
     ) AS r
     JOIN main.callback_alike AS k ON r.meanwhile_id = k.callback_id
     GROUP BY r.callback_id, k.alike_id
