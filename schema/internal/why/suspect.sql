@@ -206,6 +206,17 @@ sampled AS (
     FROM kept AS k
     JOIN way AS p ON ends_with(p.path, ' → ' || k.topic_name || ' → ' || k.node)
 ),
+-- Executors of several threads that look for work again and again.
+awake AS (
+    SELECT n.full_name AS node, min(f.detail) AS detail
+    FROM store.finding AS f
+    JOIN main.process AS p
+        ON f.run_id = p.run_id
+        AND starts_with(f.subject, printf('%s %d on ', coalesce(p.name, '?'), p.pid))
+    JOIN main.node AS n ON p.process_id = n.process_id
+    WHERE f.name = 'busy_waiting' AND list_contains($runs, f.run_id)
+    GROUP BY n.full_name
+),
 moving AS (
     SELECT
         p.what AS topic, p.path, p.path_ns, p.has_kernel, true AS is_traced, c.node,
@@ -353,17 +364,23 @@ SELECT
 FROM sampled
 UNION ALL
 SELECT
-    'way', coalesce(node, 'between nodes'), topic, path, cost_ns,
-    cost_ns >= 20_000_000 AND cost_ns >= 0.1 * path_ns,
+    CASE WHEN a.detail IS NULL THEN 'way' ELSE 'executor' END,
+    coalesce(m.node, 'between nodes'), m.topic, m.path, m.cost_ns,
+    m.cost_ns >= 20_000_000 AND m.cost_ns >= 0.1 * m.path_ns,
     printf(
         CASE
-            WHEN NOT is_traced
+            WHEN a.detail IS NOT NULL
+                THEN 'messages on %s wait for %s of %s, while its executor looks for work again and'
+                || ' again: '
+            WHEN NOT m.is_traced
                 THEN 'messages on %s are on the way, or wait in its queue, for %s of %s (not known'
                 || ' without its callbacks)'
-            WHEN has_kernel THEN 'messages on %s are on the way for %s of %s'
+            WHEN m.has_kernel THEN 'messages on %s are on the way for %s of %s'
             ELSE 'messages on %s are on the way, or its thread has no CPU, for %s of %s (not known'
                 || ' without a kernel trace)'
         END,
-        topic, main.duration_text(cost_ns), main.duration_text(path_ns)
+        m.topic, main.duration_text(m.cost_ns), main.duration_text(m.path_ns)
     )
-FROM moving
+    || coalesce(a.detail || ' (msgflow check)', '')
+FROM moving AS m
+LEFT JOIN awake AS a ON m.node = a.node
