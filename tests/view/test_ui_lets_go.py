@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import duckdb
 import pytest
@@ -25,6 +24,7 @@ from msgflow.errors import DatabaseInUseError
 from msgflow.view import pages
 from msgflow.view.kept_token import kept_token
 from msgflow.view.pages import Pages
+from msgflow.view.question import Question
 from msgflow.view.shared_database import SharedDatabase, UnopenedError
 
 HOLD = (
@@ -99,10 +99,10 @@ def test_an_ingest_into_a_database_whose_pages_are_idle(dropping: Path, database
 def test_answers_are_kept_while_it_is_closed(
     database: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[int] = []
+    counted: list[int] = []
 
-    def count(_: Pages, connection: duckdb.DuckDBPyConnection, params: dict[str, Any]) -> bytes:
-        asked.append(1)
+    def count(_: Pages, asked: Question) -> bytes:
+        counted.append(1)
         return bytes(1)
 
     monkeypatch.setitem(pages.ANSWERS, "count", count)
@@ -111,7 +111,7 @@ def test_answers_are_kept_while_it_is_closed(
         for _ in range(2):
             assert server.get("/api/count", X_Generation=generation)[::2] == (200, bytes(1))
             wait_until_let_go(database)
-    assert len(asked) == 1
+    assert len(counted) == 1
 
 
 @pytest.mark.thorough
@@ -119,10 +119,10 @@ def test_answers_are_kept_while_it_is_closed(
 def test_it_is_kept_while_a_question_runs(database: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     is_asked, may_end = threading.Event(), threading.Event()
 
-    def wait(_: Pages, connection: duckdb.DuckDBPyConnection, params: dict[str, Any]) -> bytes:
+    def wait(_: Pages, asked: Question) -> bytes:
         is_asked.set()
         assert may_end.wait(60)
-        return bytes(connection.execute("SELECT 7").fetchall()[0][0])
+        return bytes(asked.connection.execute("SELECT 7").fetchall()[0][0])
 
     monkeypatch.setitem(pages.ANSWERS, "wait", wait)
     with served(database) as server:
