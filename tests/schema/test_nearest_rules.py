@@ -568,10 +568,7 @@ def test_a_message_whose_publication_is_lost_is_of_nobody_else(
     rules: duckdb.DuckDBPyConnection,
 ) -> None:
     beside_strangers(rules)
-    rules.execute(
-        "INSERT INTO derive.recording_gap (start_ns, covered_until_ns) VALUES (?, ?)",
-        [40 * MILLISECOND, 60 * MILLISECOND],
-    )
+    lose(rules, 40 * MILLISECOND, 60 * MILLISECOND)
     assert nearest(rules)[UNUSUAL] == (9, 1)
 
 
@@ -602,6 +599,93 @@ def test_a_message_that_may_be_of_another_publication_is_no_rival(
     found = nearest(rules)
     assert found[time + 20_000] == found[time + 50_000] == (None, 1)
     assert found[time + 200_000] == (999, 1)
+
+
+def lose(con: duckdb.DuckDBPyConnection, start: int, end: int) -> None:
+    con.execute(
+        "INSERT INTO derive.recording_gap (start_ns, covered_until_ns) VALUES (?, ?)", [start, end]
+    )
+
+
+@pytest.mark.parametrize("topic", few(["/a", "/b"], "/a"))
+@pytest.mark.parametrize(("delay", "is_told"), [(5_000, True), (4_999, False)])
+def test_what_is_stamped_much_sooner_than_usual_may_be_of_a_lost_publication(
+    rules: duckdb.DuckDBPyConnection, delay: int, topic: str, *, is_told: bool
+) -> None:
+    """1 of 100 delays is shorter than 10 µs. Where nothing is lost, there is no other."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [5_500] + [10_000] * 199, MILLISECOND)
+    publish(rules, 999, time, time + MILLISECOND, topic)
+    take(rules, time + delay, topic=topic)
+    assert nearest(rules)[time + delay] == (999, 1)
+    lose(rules, time - 1, time)
+    assert nearest(rules)[time + delay] == (999 if is_told else None, 1)
+
+
+@pytest.mark.parametrize(("delay", "is_told"), [(500_000, True), (499_999, False)])
+def test_what_is_usual_for_small_messages_is_too_soon_for_a_large_one(
+    rules: duckdb.DuckDBPyConnection, delay: int, *, is_told: bool
+) -> None:
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [MILLISECOND] * 200, 2 * MILLISECOND)
+    since = 10 * MILLISECOND
+    periodic(rules, [1_000] * 200, MILLISECOND, since=since, topic="/b", first=1_000)
+    publish(rules, 999, time, time + 2 * MILLISECOND)
+    take(rules, time + delay)
+    lose(rules, time - 1, time)
+    assert nearest(rules)[time + delay] == (999 if is_told else None, 1)
+
+
+@pytest.mark.parametrize("has_rival", [True, False])
+def test_messages_of_another_writer_do_not_make_a_publisher_fast(
+    rules: duckdb.DuckDBPyConnection, *, has_rival: bool
+) -> None:
+    """Ten messages come 10 µs behind a write. If another publisher writes, too, they may be its."""
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [MILLISECOND] * 200, 2 * MILLISECOND)
+    for moment in range(0, time, 20 * PERIOD):
+        if has_rival:
+            publish(rules, 1000 + moment // PERIOD, moment - 20_000, moment + 15_000, publisher=2)
+        take(rules, moment + 10_000)
+    publish(rules, 999, time, time + 2 * MILLISECOND)
+    take(rules, time + 400_000)
+    lose(rules, time - 1, time)
+    assert nearest(rules)[time + 400_000] == (None if has_rival else 999, 1)
+
+
+def test_nothing_is_too_soon_where_nothing_is_usual(rules: duckdb.DuckDBPyConnection) -> None:
+    clock(rules, (0, 100, 0))
+    publish(rules, 1, 0, None)
+    take(rules, MICROSECOND)
+    lose(rules, -1, 0)
+    assert nearest(rules) == {MICROSECOND: (1, 1)}
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "next_event", "is_told"),
+    [
+        pytest.param(-9, -1, MILLISECOND, True, id="before"),
+        pytest.param(-9, 0, MILLISECOND, False, id="as_it_begins"),
+        pytest.param(MILLISECOND, 9 * MILLISECOND, MILLISECOND, False, id="as_the_thread_goes_on"),
+        pytest.param(MILLISECOND + 1, 9 * MILLISECOND, MILLISECOND, True, id="behind"),
+        pytest.param(5 * MILLISECOND, 9 * MILLISECOND, None, False, id="while_it_may_write"),
+        pytest.param(5 * MILLISECOND + 1, 9 * MILLISECOND, None, True, id="once_it_is_written"),
+    ],
+)
+def test_if_there_is_a_gap_beside_it(
+    rules: duckdb.DuckDBPyConnection,
+    start: int,
+    end: int,
+    next_event: int | None,
+    *,
+    is_told: bool,
+) -> None:
+    clock(rules, (0, 100, 0))
+    time = periodic(rules, [10_000] * 200, MILLISECOND)
+    publish(rules, 999, time, None if next_event is None else time + next_event)
+    take(rules, time + 1_000)
+    lose(rules, time + start, time + end)
+    assert nearest(rules)[time + 1_000] == (999 if is_told else None, 1)
 
 
 @pytest.mark.parametrize(("matched", "is_known"), [(5, True), (4, False)])

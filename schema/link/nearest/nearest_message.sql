@@ -5,7 +5,8 @@
 --     the thread did next is not known, or publishers are not traced, the delays that are usual
 --     bound the search. A message has no publication where that would be a guess: where several
 --     come into question; where two messages may both be of one publication; where another
---     publication or message is within what a drift could move it, if the drift is not known; if
+--     publication or message is within what a drift could move it, if the drift is not known; if it
+--     was stamped sooner after a publication than is usual, and another publication may be lost; if
 --     the thread was writing another just before; if others publish on the topic, and it came
 --     sooner than this publisher's messages do. Nearly all messages come some time after their
 --     write, and the difference of the clocks may be wrong by that time. Nor has it one where the
@@ -236,11 +237,13 @@ usual AS (
     WHERE w.place = 1 AND w.goes_on
     GROUP BY w.publisher_id
 ),
--- If a publisher was never seen to go on, what is usual on its host is expected of it.
+-- If a publisher was never seen to go on, what is usual on its host is expected of it. A message
+-- that comes much sooner than nearly all others may be of another publication, if one may be lost.
 usual_of_clock AS (
     SELECT
         clock_id,
         quantile_disc(delay_ns, derive.clock_limit().usual_quantile) AS usual_ns,
+        quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile) AS least_ns,
         -- A message soon behind another write may be of that one, and shows nothing.
         quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile)
             FILTER (coalesce(closed_for_ns >= derive.clock_limit().burst_ns, true)) AS alone_ns,
@@ -269,6 +272,7 @@ candidate AS MATERIALIZED (
             w.publication_id, w.goes_on, w.delay_ns,
             w.is_crowded OR coalesce(w.closed_for_ns < c.alone_ns, false) AS is_crowded,
             w.delay_ns <= u.usual_ns AS is_prompt,
+            c.least_ns,
             CASE
                 WHEN x.publisher_id IS NOT NULL
                     THEN coalesce(w.delay_ns BETWEEN u.soonest_ns AND c.familiar_ns, false)
@@ -302,10 +306,25 @@ owned AS MATERIALIZED (
         PARTITION BY publication_id, only_subscription_id ORDER BY source_timestamp_ns
     )
 ),
+-- Large messages take long to write. One that comes much sooner than nearly all others of its
+-- publisher may be of a publication that was lost. Messages that others may have written do not
+-- count.
+soonest AS (
+    SELECT
+        publisher_id,
+        quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile) AS least_ns
+    FROM candidate
+    WHERE candidate_count = 1
+    GROUP BY publisher_id
+),
 left_over AS (
     SELECT
         c.topic_name, c.source_timestamp_ns, c.only_subscription_id, c.publisher_id,
         c.publication_id, c.is_crowded, c.is_usual, c.is_prompt,
+        coalesce(
+            derive.clock_limit().usual_factor * c.delay_ns < greatest(u.least_ns, c.least_ns),
+            false
+        ) AS is_hasty,
         count(*) OVER (
             PARTITION BY c.topic_name, c.source_timestamp_ns, c.only_subscription_id
         ) AS candidate_count
@@ -315,16 +334,20 @@ left_over AS (
         AND c.only_subscription_id = o.only_subscription_id
         AND c.source_timestamp_ns <> o.source_timestamp_ns
         AND o.place = 1
+    LEFT JOIN soonest AS u ON c.publisher_id = u.publisher_id
     WHERE o.publication_id IS NULL
         OR NOT o.is_usual
         OR (o.is_rivalled AND c.candidate_count = 1 AND c.is_prompt)
 ),
+hasty AS MATERIALIZED (SELECT DISTINCT publication_id FROM left_over WHERE is_hasty),
+doubtful AS (FROM derive.publication_beside_gap('hasty')),
 matched AS (
     SELECT
         topic_name, publisher_id, source_timestamp_ns, only_subscription_id, publication_id,
         is_crowded
         OR NOT is_usual
         OR count(*) OVER (PARTITION BY publication_id, only_subscription_id, candidate_count) > 1
+        OR (is_hasty AND publication_id IN (FROM doubtful))
         OR EXISTS (
             FROM missed AS m
             WHERE m.topic_name = left_over.topic_name
