@@ -386,9 +386,7 @@ def _like(name: str, path: Path) -> Header:
     return _declaring((resource_directory(room) if room else path.parent) / f"{stem}.sql")
 
 
-@cache
-def _declaring(path: Path) -> Header:
-    return read(path)
+_declaring = cache(read)
 
 
 def _params(fields: Sequence[_Field], like: Sequence[Header], path: Path) -> Iterator[Param]:
