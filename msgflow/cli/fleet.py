@@ -206,22 +206,17 @@ def query(
     words = {"case": case, "measure": measure, "section": section}
     own = {word: value for word, value in words.items() if value is not None}
     header_of(name, own)
+    selection = {
+        "node": node, "topic": topic, "callback": callback, "host": host, "via": via,
+        "without": without, "sort": sort, "limit": limit,
+    }  # fmt: skip
     result = fleet_query(
         _opened(lake),
         name,
         where=where,
         group_by=values_of(one_text(group_by)),
         internal=internal,
-        selection={
-            "node": one_text(node),
-            "topic": one_text(topic),
-            "callback": one_text(callback),
-            "host": one_text(host),
-            "via": one_text(via),
-            "without": one_text(without),
-            "sort": one_text(sort),
-            "limit": limit,
-        },
+        selection={word: one_text(value) for word, value in selection.items()},
         **own,
     )
     print_result(result, **shown, columns=columns, most_rows=limit or MOST_ROWS)

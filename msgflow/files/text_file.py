@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import stat
 from pathlib import Path
 
 from msgflow.errors import UsageError
+from msgflow.trace.regular_file import read_regular
 
 # No user writes more by hand. Parsers of YAML need a hundred times as much memory.
 MOST_BYTES = 1_000_000
@@ -15,19 +14,12 @@ MOST_BYTES = 1_000_000
 def read_text(path: Path, what: str, hint: str) -> str:
     """Return the text of a file."""
     try:
-        with open(
-            path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK)
-        ) as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise UsageError(f"{what}: not a regular file — {path}", hint)
-            content = file.read(MOST_BYTES + 1)
+        content = read_regular(path, MOST_BYTES)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise UsageError(f"{what}: {reason} — {path}", hint) from error
     except ValueError as error:  # such as a NUL in the path
         raise UsageError(f"{what}: {error} — {path}", hint) from error
-    if len(content) > MOST_BYTES:
-        raise UsageError(f"{what}: larger than {MOST_BYTES // 1_000} kB — {path}", hint)
     try:
         return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:

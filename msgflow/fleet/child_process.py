@@ -14,7 +14,6 @@ import re
 import shutil
 import sys
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -49,7 +48,7 @@ def _end_with_parent() -> None:
 
 def do(task: Task, directory: Path) -> Outcome:
     """Fetch, ingest, check and write one recording; commit nothing."""
-    begin, stage = time.monotonic(), ""
+    stage = ""
 
     def enter(name: str) -> None:
         nonlocal stage
@@ -59,13 +58,9 @@ def do(task: Task, directory: Path) -> Outcome:
 
     try:
         values = _values(task, directory, enter)
-        return Outcome(
-            values=values,
-            signature=values["source_signature"],
-            seconds=time.monotonic() - begin,
-        )
+        return Outcome(values=values, signature=values["source_signature"])
     except Exception as error:
-        return failed_outcome(error, stage, time.monotonic() - begin)
+        return failed_outcome(error, stage)
 
 
 def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[str, Any]:
@@ -134,7 +129,7 @@ def _rename_paths(database: Path, before: str, after: str) -> None:
             )
 
 
-def failed_outcome(error: Exception, stage: str, seconds: float) -> Outcome:
+def failed_outcome(error: Exception, stage: str) -> Outcome:
     """Return the outcome of a recording at which an error was raised."""
     message = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
     hint = None
@@ -159,7 +154,6 @@ def failed_outcome(error: Exception, stage: str, seconds: float) -> Outcome:
         stage=stage,
         error=without_secrets(message),
         hint=hint and without_secrets(hint),
-        seconds=seconds,
     )
 
 

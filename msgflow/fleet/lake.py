@@ -23,21 +23,8 @@ import pyarrow.parquet
 from msgflow.db.sandbox import open_memory
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.files.text_file import MOST_BYTES
+from msgflow.fleet import layout
 from msgflow.fleet.file_store import Store
-from msgflow.fleet.layout import (
-    ABOUT,
-    FAILURE,
-    FAILURE_SCHEMA,
-    LAKE_REVISION,
-    PACKED,
-    RUN,
-    RUN_SCHEMA,
-    about,
-    failure_path,
-    metadata,
-    require_readable,
-    run_path,
-)
 from msgflow.fleet.parquet import read_parquet
 from msgflow.sql.failure import first_line
 from msgflow.sql.statement import registered
@@ -67,9 +54,9 @@ class Lake:
         store = Store(url, follows_links=False)
         # First: what another process writes meanwhile, it writes behind the file that is read next.
         is_free = create and _is_free(store)
-        content = store.read(ABOUT, MOST_BYTES)
+        content = store.read(layout.ABOUT, MOST_BYTES)
         if content is not None:
-            require_readable(content, store.url)
+            layout.require_readable(content, store.url)
         elif not create:
             raise DatabaseError(
                 f"no lake — {store.url}", "msgflow fleet ingest SOURCE --lake makes one"
@@ -81,7 +68,7 @@ class Lake:
             )
         if create:
             # Also where it exists: so it fails now if nothing can be written.
-            store.put(ABOUT, about())
+            store.put(layout.ABOUT, layout.about())
         return cls(store)
 
     def runs(self) -> pa.Table:
@@ -91,7 +78,7 @@ class Lake:
             # One that is gone by now was removed meanwhile.
             tables = [rows for rows in pool.map(self._rows, self.names()) if rows is not None]
         if not tables:
-            return RUN_SCHEMA.empty_table()
+            return layout.RUN_SCHEMA.empty_table()
         rows = pa.concat_tables(tables).combine_chunks()
         # SQL, as importing pyarrow.compute takes longer.
         with open_memory() as con, registered(con, known=rows):
@@ -100,10 +87,10 @@ class Lake:
     def names(self) -> list[str]:
         """Return the names of the files of the table `run`: keys of runs, and `PACKED`."""
         # `pack` would delete the files of runs that are not listed.
-        self.store.require_files(RUN, ".parquet")
+        self.store.require_files(layout.RUN, ".parquet")
         return [
-            entry.path.removeprefix(f"{RUN}/").removesuffix(".parquet")
-            for entry in self.store.entries(RUN, recursive=False)
+            entry.path.removeprefix(f"{layout.RUN}/").removesuffix(".parquet")
+            for entry in self.store.entries(layout.RUN, recursive=False)
             if entry.path.endswith(".parquet")
         ]
 
@@ -115,9 +102,9 @@ class Lake:
     def _rows(self, name: str) -> pa.Table | None:
         """Return the rows of a file of the table `run`, None if there is no such file."""
         hint = "check that nobody else than msgflow has written there"
-        rows = self._read(run_path(name), RUN_SCHEMA, "the runs", hint)
+        rows = self._read(layout.run_path(name), layout.RUN_SCHEMA, "the runs", hint)
         if rows is not None:
-            _require_sound(rows, name, self.store.url_of(run_path(name)))
+            _require_sound(rows, name, self.store.url_of(layout.run_path(name)))
         return rows
 
     def _read(self, path: str, schema: pa.Schema, what: str, hint: str) -> pa.Table | None:
@@ -142,13 +129,13 @@ class Lake:
 
     def pack_runs(self, rows: Sequence[Mapping[str, Any]]) -> None:
         """Write all rows of the table `run` into one file, in place of all others."""
-        self._put_runs(PACKED, rows)
+        self._put_runs(layout.PACKED, rows)
 
     def _put_runs(self, name: str, rows: Sequence[Mapping[str, Any]]) -> None:
-        whole = [{**row, "lake_revision": LAKE_REVISION} for row in rows]
-        table = pa.Table.from_pylist(whole, schema=RUN_SCHEMA)
+        whole = [{**row, "lake_revision": layout.LAKE_REVISION} for row in rows]
+        table = pa.Table.from_pylist(whole, schema=layout.RUN_SCHEMA)
         revision = max((row.get("schema_revision") or "" for row in whole), default="")
-        self.put_table(run_path(name), RUN, table, revision)
+        self.put_table(layout.run_path(name), layout.RUN, table, revision)
 
     def remove(self, keys: Iterable[str], *, of: str | None = None) -> int:
         """Remove runs from the lake; `msgflow fleet pack` deletes their files.
@@ -161,8 +148,8 @@ class Lake:
         wanted = set(keys)
         # Of two at the same time, the second would write again what the first one took out.
         with self.changing():
-            own = set(self.names()) - {PACKED}
-            rows = self._rows(PACKED)
+            own = set(self.names()) - {layout.PACKED}
+            rows = self._rows(layout.PACKED)
             packed = {row["run"]: row for row in (() if rows is None else rows.to_pylist())}
             if of is not None:
                 now = {key: self.run(key) or packed.get(key) for key in wanted}
@@ -178,16 +165,16 @@ class Lake:
             if len(kept) < len(packed) or (wanted and not kept and own <= wanted):
                 self.pack_runs(kept)
             for key in wanted:
-                self.store.delete(run_path(key))
+                self.store.delete(layout.run_path(key))
         return len(wanted)
 
     def failures(self) -> pa.Table:
         """Return the failed recordings: one row each, by source, columns of `FAILURE_SCHEMA`."""
-        tables = [FAILURE_SCHEMA.empty_table()]
+        tables = [layout.FAILURE_SCHEMA.empty_table()]
         hint = "delete this file; its recording will be tried again"
-        for entry in self.store.entries(FAILURE, recursive=False):
+        for entry in self.store.entries(layout.FAILURE, recursive=False):
             if entry.path.endswith(".parquet"):
-                rows = self._read(entry.path, FAILURE_SCHEMA, "a failure", hint)
+                rows = self._read(entry.path, layout.FAILURE_SCHEMA, "a failure", hint)
                 # Another process may have ingested the recording and deleted this file meanwhile.
                 tables += [] if rows is None else [rows]
         return pa.concat_tables(tables).sort_by("source")
@@ -195,17 +182,17 @@ class Lake:
     def write_failure(self, values: Mapping[str, Any]) -> None:
         """Write the failure of a recording, in place of an earlier one."""
         row = {**values, "msgflow_version": __version__, "failed_ns": time.time_ns()}
-        table = pa.Table.from_pylist([row], schema=FAILURE_SCHEMA)
-        self.put_table(failure_path(row["source"]), FAILURE, table, "")
+        table = pa.Table.from_pylist([row], schema=layout.FAILURE_SCHEMA)
+        self.put_table(layout.failure_path(row["source"]), layout.FAILURE, table, "")
 
     def forget_failure(self, source: str) -> None:
         """Delete the failure of a recording, which is in the lake now."""
-        self.store.delete(failure_path(source))
+        self.store.delete(layout.failure_path(source))
 
     def put_table(self, path: str, table_name: str, table: pa.Table, revision: str) -> None:
         """Write a table as one file."""
         # The schema has the descriptions of columns, which the table may lack.
-        schema = table.schema.with_metadata(metadata(table_name, revision))
+        schema = table.schema.with_metadata(layout.metadata(table_name, revision))
         sink = pa.BufferOutputStream()
         # Thousands of files have one row: to unpack it would take longer than to read it.
         is_small = len(table) <= 1
@@ -229,8 +216,8 @@ class Lake:
         """Keep others from changing the table `run` meanwhile, where there are locks."""
         if self.store.is_local:
             with suppress(OSError):  # writing there will tell
-                os.makedirs(self.store.full(RUN), exist_ok=True)
-        return self._locked(RUN, fcntl.LOCK_EX)
+                os.makedirs(self.store.full(layout.RUN), exist_ok=True)
+        return self._locked(layout.RUN, fcntl.LOCK_EX)
 
     @contextmanager
     def _locked(self, path: str, kind: int) -> Iterator[None]:
@@ -256,7 +243,7 @@ class Lake:
 def _is_free(store: Store) -> bool:
     """Tell whether there is nothing, or no more than another process that makes a lake there."""
     found = [each.path for each in store.entries(recursive=False)] + store.folders()
-    return all(name.startswith(f".{ABOUT}.") for name in found)
+    return all(name.startswith(f".{layout.ABOUT}.") for name in found)
 
 
 def _require_sound(rows: pa.Table, name: str, url: str) -> None:
@@ -268,7 +255,7 @@ def _require_sound(rows: pa.Table, name: str, url: str) -> None:
         what = f"a row without {lacking[0]}"
     elif unfit:
         what = f"a {unfit[0]} that is no name"
-    elif name != PACKED and names["run"] != [name]:
+    elif name != layout.PACKED and names["run"] != [name]:
         what = "a file with another name than its run"
     else:
         return

@@ -127,11 +127,7 @@ def fleet_query(
             return con.sql(sql, params=own | bindings).to_arrow_table()
 
         table = _asked(lake, name, con, ask)
-    table, missing, _ = shown_rows(
-        table,
-        internal=internal,
-        on_hidden=lambda count: f"internal rows are hidden ({count:,}); --internal shows them",
-    )
+    table, missing, _ = shown_rows(table, internal=internal)
     notes = []
     if len(choice.runs) < choice.total:
         notes.append(f"{len(choice.runs):,} of {choice.total:,} runs")

@@ -17,18 +17,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from msgflow.errors import DatabaseError
+from msgflow.fleet import layout
 from msgflow.fleet.answers import ANSWERS
-from msgflow.fleet.layout import (
-    DATABASE,
-    PACKED,
-    RUN,
-    VIEWS,
-    new_pack,
-    packed_runs,
-    part_of,
-    part_path,
-    run_path,
-)
 from msgflow.fleet.parquet import read_parquet
 from msgflow.sql.failure import first_line
 from msgflow.version import __version__
@@ -63,22 +53,24 @@ def pack(lake: Lake) -> Packed:
         packed = {row["run"]: row for row in lake.runs().to_pylist()}
         before = dict(packed)
         packs = 0
-        views = sorted({entry.path.rpartition("/")[0] for entry in lake.store.entries(VIEWS)})
+        views = sorted(
+            {entry.path.rpartition("/")[0] for entry in lake.store.entries(layout.VIEWS)}
+        )
         for key, tables in (("part", [*ANSWERS]), ("view_part", views)):
             sizes = Counter[str]()
             for table in tables:
                 for entry in lake.store.entries(table):
-                    sizes[part_of(entry.path) or ""] += entry.size
+                    sizes[layout.part_of(entry.path) or ""] += entry.size
             for group in _groups(list(packed.values()), key, sizes):
                 part = _pack(lake, group, key, tables)
                 packed |= {row["run"]: {**row, key: part} for row in group}
                 packs += 1
         changed = sum(packed[run] != before[run] for run in packed)
-        own = {run_path(key) for key in packed}
-        if packs or own.intersection(entry.path for entry in lake.store.entries(RUN)):
+        own = {layout.run_path(key) for key in packed}
+        if packs or own.intersection(entry.path for entry in lake.store.entries(layout.RUN)):
             lake.pack_runs(list(packed.values()))
         # Without a run, no row is left to keep.
-        deleted = _clean_up(lake, own or {run_path(PACKED)}, packed.values())
+        deleted = _clean_up(lake, own or {layout.run_path(layout.PACKED)}, packed.values())
     return Packed(changed, packs, len(deleted), sum(entry.size for entry in deleted))
 
 
@@ -93,7 +85,7 @@ def _groups(
     full = {
         part
         for part in living
-        if living[part] == packed_runs(part)
+        if living[part] == layout.packed_runs(part)
         and (living[part] > _MOST_RUNS // 2 or sizes[part] > _MOST_BYTES // 2)
     }
     loose = [row for row in runs if row[key] is not None and row[key] not in full]
@@ -117,7 +109,7 @@ def _groups(
         group
         for group in groups
         if len(parts := {row[key] for row in group}) > 1
-        or any(packed_runs(part) > living[part] for part in parts)
+        or any(layout.packed_runs(part) > living[part] for part in parts)
     ]
 
 
@@ -126,12 +118,12 @@ def _version(row: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _pack(lake: Lake, rows: Sequence[Mapping[str, Any]], key: str, tables: Sequence[str]) -> str:
-    part = new_pack(len(rows))
+    part = layout.new_pack(len(rows))
     for table in tables:
         whole = _together(lake, table, rows, key, part)
         if whole is not None:
             revision = rows[0]["schema_revision"] or ""
-            lake.put_table(part_path(table, part), table.rpartition("/")[2], whole, revision)
+            lake.put_table(layout.part_path(table, part), table.rpartition("/")[2], whole, revision)
     return part
 
 
@@ -154,7 +146,7 @@ def _together(
             raise _unusable(lake, table, part, runs, "it is missing")
         first = next(iter(there))
         if there[part].schema != there[first].schema:
-            other = lake.store.url_of(part_path(table, first))
+            other = lake.store.url_of(layout.part_path(table, first))
             raise _unusable(lake, table, part, runs, f"it differs from {other}")
     whole = pa.concat_tables(there.values())
     names = pa.repeat(pa.scalar(pack), len(whole))
@@ -164,7 +156,7 @@ def _together(
 
 
 def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | None:
-    content = lake.store.read(part_path(table, part))
+    content = lake.store.read(layout.part_path(table, part))
     if content is None:
         return None
     try:
@@ -176,8 +168,9 @@ def _read(lake: Lake, table: str, part: str, runs: Sequence[str]) -> pa.Table | 
 
 
 def _unusable(lake: Lake, table: str, part: str, runs: Sequence[str], why: str) -> DatabaseError:
+    url = lake.store.url_of(layout.part_path(table, part))
     return DatabaseError(
-        f"a file of the lake cannot be used: {why} — {lake.store.url_of(part_path(table, part))}",
+        f"a file of the lake cannot be used: {why} — {url}",
         f"{shlex.join(['msgflow', 'fleet', 'remove', runs[0], '--lake', lake.store.url])};"
         " ingest it again",
     )
@@ -186,27 +179,29 @@ def _unusable(lake: Lake, table: str, part: str, runs: Sequence[str], why: str) 
 def _clean_up(lake: Lake, own: set[str], runs: Iterable[Mapping[str, Any]]) -> list[Entry]:
     """Delete the runs' own files of the table `run`, then the files of parts that no run names."""
     unneeded = [
-        entry for entry in lake.store.entries(RUN) if entry.path in own or part_of(entry.path) == ""
+        entry
+        for entry in lake.store.entries(layout.RUN)
+        if entry.path in own or layout.part_of(entry.path) == ""
     ]
     needed = {
         **{table: {row["part"] for row in runs} for table in ANSWERS},
-        VIEWS: {row["view_part"] for row in runs},
-        DATABASE: {row["database_part"] for row in runs},
+        layout.VIEWS: {row["view_part"] for row in runs},
+        layout.DATABASE: {row["database_part"] for row in runs},
     }
     for folder, parts in needed.items():
         unneeded += [
             entry
             for entry in lake.store.entries(folder)
-            if (part := part_of(entry.path)) is not None and part not in parts
+            if (part := layout.part_of(entry.path)) is not None and part not in parts
         ]
     # `remove` leaves a file here, also where it took out the last run.
     if unneeded and not lake.names():
         raise DatabaseError(
-            f"the lake has answers, but no run — {lake.store.url_of(RUN)}",
+            f"the lake has answers, but no run — {lake.store.url_of(layout.RUN)}",
             "is its file system mounted? If an ingest was killed, start that again",
         )
     # The file without a row last: without it, the rest would look like a lake that is not mounted.
-    unneeded.sort(key=lambda entry: entry.path == run_path(PACKED))
+    unneeded.sort(key=lambda entry: entry.path == layout.run_path(layout.PACKED))
     for entry in unneeded:
         lake.store.delete(entry.path)
     return unneeded

@@ -32,7 +32,7 @@ def run_task(task: Task) -> Outcome:
     begin = time.monotonic()
     try:
         with temporary_directory(_PREFIX, task.scratch) as directory:
-            outcome = _watched(task, directory, begin)
+            outcome = _watched(task, directory, begin + task.timeout)
     except OSError as error:
         is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         outcome = Outcome(
@@ -41,12 +41,12 @@ def run_task(task: Task) -> Outcome:
             error=f"{error.strerror or error} — {task.scratch or tempfile.gettempdir()}",
             hint=f"give a folder {'with free space' if is_full else 'that can be written'} with"
             " --scratch",
-            seconds=time.monotonic() - begin,
         )
-    return replace(outcome, worker=f"{socket.gethostname()}:{os.getpid()}")
+    worker = f"{socket.gethostname()}:{os.getpid()}"
+    return replace(outcome, worker=worker, seconds=time.monotonic() - begin)
 
 
-def _watched(task: Task, directory: Path, begin: float) -> Outcome:
+def _watched(task: Task, directory: Path, end: float) -> Outcome:
     with (directory / _LOG).open("wb") as log:
         child = subprocess.Popen(
             # -P: nothing is imported from the current folder.
@@ -65,15 +65,12 @@ def _watched(task: Task, directory: Path, begin: float) -> Outcome:
             child.stdin.write(json.dumps(asdict(task)).encode() + b"\n")
             child.stdin.flush()
         while child.poll() is None:
-            if time.monotonic() - begin > task.timeout:
-                return _ended(
-                    directory, begin, Reason.TIMEOUT, f"not done after {task.timeout:g} s"
-                )
+            if time.monotonic() > end:
+                return _ended(directory, Reason.TIMEOUT, f"not done after {task.timeout:g} s")
             used = _memory(child.pid)
             if task.memory is not None and used > task.memory:
                 return _ended(
                     directory,
-                    begin,
                     Reason.TOO_LARGE,
                     f"it took {used:,} bytes of memory, and may take {task.memory:,}",
                 )
@@ -86,10 +83,10 @@ def _watched(task: Task, directory: Path, begin: float) -> Outcome:
         return Outcome(**json.loads((directory / RESULT).read_text(encoding="utf-8")))
     except (OSError, ValueError):
         how = f"signal {-child.returncode}" if child.returncode < 0 else f"{child.returncode}"
-        return _ended(directory, begin, Reason.CRASHED, f"the process ended with {how}")
+        return _ended(directory, Reason.CRASHED, f"the process ended with {how}")
 
 
-def _ended(directory: Path, begin: float, reason: Reason, words: str) -> Outcome:
+def _ended(directory: Path, reason: Reason, words: str) -> Outcome:
     stage, log = "starting", ""
     with contextlib.suppress(OSError):
         stage = (directory / STAGE).read_text(encoding="utf-8")
@@ -106,7 +103,6 @@ def _ended(directory: Path, begin: float, reason: Reason, words: str) -> Outcome
         stage=stage,
         error=without_secrets(f"{words}: {last}" if last else words),
         hint=hints.get(reason),
-        seconds=time.monotonic() - begin,
     )
 
 

@@ -64,7 +64,8 @@ def match_links(
     leave_out: Callable[[DeclaredLink, UsageError], None] | None = None,
 ) -> tuple[MatchedLink, ...]:
     """Return the links of a file with the nodes and topics of a run; see `declare_links`."""
-    nodes = _read_nodes(con, run_id)
+    rows = internal_sql().run(con, "link_node", {"run_id": run_id}).fetchall()
+    nodes = [Node(_endpoints_of(heard), _endpoints_of(said), *of) for heard, said, *of in rows]
     matched: list[MatchedLink] = []
     for link in file.links:
         try:
@@ -75,11 +76,6 @@ def match_links(
             leave_out(link, error)
     _refuse_cycles(file.file, matched)
     return tuple(matched)
-
-
-def _read_nodes(con: duckdb.DuckDBPyConnection, run_id: int) -> list[Node]:
-    rows = internal_sql().run(con, "link_node", {"run_id": run_id}).fetchall()
-    return [Node(_endpoints_of(heard), _endpoints_of(said), *named) for heard, said, *named in rows]
 
 
 def _endpoints_of(rows: Sequence[dict[str, Any]] | None) -> tuple[Endpoint, ...]:

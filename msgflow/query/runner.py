@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -169,7 +169,7 @@ def run_query(
                     unknown[1] if unknown else "", known, f"the columns are {', '.join(known)}"
                 ),
             ) from error
-    table, missing, has_rows = shown_rows(table, internal=internal, on_hidden=_on_hidden)
+    table, missing, has_rows = shown_rows(table, internal=internal)
     notes = [] if runs else ["the database holds no run yet"]
     if part.has_window:
         notes += outside(runs, window)
@@ -237,9 +237,7 @@ def _checked(command: str, param: Param, value: Value) -> Value:
     return value
 
 
-def shown_rows(
-    table: pa.Table, *, internal: bool, on_hidden: Callable[[int], str]
-) -> tuple[pa.Table, list[str], bool]:
+def shown_rows(table: pa.Table, *, internal: bool) -> tuple[pa.Table, list[str], bool]:
     """Return the rows to show, notes on those that are missing, and whether there are any."""
     total, hidden, cut = (table[name][0].as_py() for name in COUNTS)
     if table[PLACE][0].as_py() is None:
@@ -251,12 +249,8 @@ def shown_rows(
     if table.num_rows < total:
         notes.append(f"{table.num_rows:,} of {total:,} rows")
     if hidden:
-        notes.append(on_hidden(hidden))
+        rows = "1 internal row is" if hidden == 1 else f"{hidden:,} internal rows are"
+        notes.append(f"{rows} hidden; --internal shows them")
     if cut:
         notes.append(f"{cut} of the rows are cut off by the limits of the query, see {CUT_COLUMN}")
     return table, notes, bool(total or hidden)
-
-
-def _on_hidden(count: int) -> str:
-    rows = "1 internal row is" if count == 1 else f"{count} internal rows are"
-    return f"{rows} hidden; --internal shows them"

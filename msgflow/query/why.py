@@ -207,7 +207,8 @@ def _explained(
     waits = _rows(connection, _OWN_WAITS, waits, callbacks=callbacks)
     losses = _rows(connection, _OWN_LOSSES, losses, places=places)
     paths = _rows(connection, _WORST_FIRST, paths, path=path)
-    notes = [*_cures(verdict)]
+    sentences = " ".join(verdict["sentence"].to_pylist())
+    notes = [cure for unknown, cure in _UNKNOWN.items() if unknown in sentences]
     if skipped:
         notes.append(
             f"without the first {skipped:g} s, a warm-up: the longest latencies lie there (--start"
@@ -236,13 +237,6 @@ def _worst(verdict: pa.Table, paths: QueryResult) -> str:
             return str(path)
     slowest = max(paths.table.to_pylist(), key=lambda row: row["p95_ns"] or 0)
     return str(slowest["path"])
-
-
-def _cures(verdict: pa.Table) -> Iterator[str]:
-    said = " ".join(verdict["sentence"].to_pylist())
-    for unknown, cure in _UNKNOWN.items():
-        if unknown in said:
-            yield cure
 
 
 def _has_flows(paths: QueryResult) -> bool:

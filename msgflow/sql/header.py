@@ -128,6 +128,9 @@ SCHEMAS = {
     "health": "finding",
     "internal": "internal",
 }
+# Fields of a header that have the text that stands there, or the names.
+_TEXTS = ("severity", "cause", "cure", "note", "slowest", "zero")
+_LISTS = ("brief", "answer", "heading", "also", "unites")
 _NOTES = ("clocks", "callbacks", "kernel", "requests", "goals", "samples")
 
 
@@ -300,22 +303,13 @@ def parse(text: str, path: Path) -> Header:
         kind=kind,
         params=params,
         columns=columns,
-        severity=single.get("severity"),
-        cause=single.get("cause"),
-        cure=single.get("cure"),
-        note=note,
         body=body,
         path=path,
-        brief=_names(single.get("brief", "")),
-        answer=_names(single.get("answer", "")),
-        heading=_names(single.get("heading", "")),
-        slowest=single.get("slowest"),
-        zero=single.get("zero"),
         steps=steps,
         sources=_sources(single.get("when", "")),
-        also=_names(single.get("also", "")),
-        unites=_names(single.get("unites", "")),
         variants=variants,
+        **{key: single.get(key) for key in _TEXTS},  # type: ignore[arg-type]
+        **{key: _names(single.get(key, "")) for key in _LISTS},  # type: ignore[arg-type]
     )
 
 
@@ -392,9 +386,7 @@ def _like(name: str, path: Path) -> Header:
     return _declaring((resource_directory(room) if room else path.parent) / f"{stem}.sql")
 
 
-@cache
-def _declaring(path: Path) -> Header:
-    return read(path)
+_declaring = cache(read)
 
 
 def _params(fields: Sequence[_Field], like: Sequence[Header], path: Path) -> Iterator[Param]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import gzip
-import io
 import lzma
 import os
 import re
@@ -58,20 +57,13 @@ _XZ = b"\xfd7zXZ\x00"
 # What Arrow unpacks: the standard library learned Zstandard only in Python 3.14, and LZ4 never.
 _OF_ARROW = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
 
-
-class _ArrowError(Exception):
-    """Data that Arrow unpacks are damaged."""
-
-
-# What reading a damaged archive raises.
+# What reading a damaged archive raises; gzip and Arrow raise an OSError without a number.
 _CORRUPT = (
     tarfile.TarError,
     zipfile.BadZipFile,
-    gzip.BadGzipFile,
     lzma.LZMAError,
     zlib.error,
     struct.error,
-    _ArrowError,
     EOFError,
     UnicodeError,
     ValueError,
@@ -95,15 +87,15 @@ def unpack(archive: Path, directory: Path) -> None:
             f"the archive cannot be unpacked ({_reason(error)}) — {archive}",
             hint="unpack it by hand and give the directory",
         ) from error
-    except _CORRUPT as error:
+    except (*_CORRUPT, OSError) as error:
+        if isinstance(error, OSError) and error.errno is not None:
+            raise TraceError(
+                f"cannot unpack the archive ({error.strerror}) — {archive}",
+                hint="TMPDIR=DIRECTORY msgflow … unpacks it elsewhere",
+            ) from error
         raise TraceError(
             f"the archive is damaged or cut off ({_reason(error)}) — {archive}",
             hint="copy or pack it again from where the trace was recorded",
-        ) from error
-    except OSError as error:
-        raise TraceError(
-            f"cannot unpack the archive ({error.strerror or error}) — {archive}",
-            hint="TMPDIR=DIRECTORY msgflow … unpacks it elsewhere",
         ) from error
 
 
@@ -310,7 +302,7 @@ def _unpack_zip(file: IO[bytes], target: Target) -> None:
 def _open_plain(file: IO[bytes]) -> Any:
     """Return the content of a file, decompressed as its first bytes say.
 
-    It has a method `read`, which raises one of `_CORRUPT` where the file is damaged.
+    It has a method `read`, which raises an OSError or one of `_CORRUPT` where that is damaged.
     """
     magic = file.read(_MAGIC_SIZE)
     file.seek(0)
@@ -320,21 +312,7 @@ def _open_plain(file: IO[bytes]) -> Any:
         return lzma.LZMAFile(file)
     for first, name in _OF_ARROW.items():
         if magic.startswith(first):
-            return _Unpacked(file, name)
+            import pyarrow
+
+            return pyarrow.CompressedInputStream(pyarrow.PythonFile(file, "r"), name)
     return file
-
-
-class _Unpacked(io.RawIOBase):
-    """What Arrow unpacks."""
-
-    def __init__(self, file: IO[bytes], compression: str) -> None:
-        import pyarrow
-
-        self._content = pyarrow.CompressedInputStream(pyarrow.PythonFile(file, "r"), compression)
-
-    def read(self, size: int = -1) -> bytes:
-        try:
-            content: bytes = self._content.read(size)
-        except OSError as error:
-            raise _ArrowError(str(error)) from error
-        return content

@@ -145,9 +145,6 @@ def _value(number: str, unit: str, dimension: Dimension, metric: str) -> float:
         known = [name for of in UNITS.values() for name in of if name]
         fitting = [name for name in units if name.lower() == unit.lower()]
         near = fitting or [name for name in nearest(unit, known) if name in units]
-        what = "no unit" if not unit else f"no such unit for {metric} — {unit}"
-        raise ConditionError(
-            f"{metric} has {what}" if not unit else f"there is {what}",
-            meant_or(near[:1], f"{metric} is {_NAMES[dimension]}"),
-        )
+        what = f"there is no such unit for {metric} — {unit}" if unit else f"{metric} has no unit"
+        raise ConditionError(what, meant_or(near[:1], f"{metric} is {_NAMES[dimension]}"))
     return float(number) * units[unit]

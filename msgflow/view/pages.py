@@ -21,18 +21,9 @@ from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.sql.statement import internal_sql
 from msgflow.text.shell import shell_joined
+from msgflow.view import summary
 from msgflow.view.page_query import Params, Question, Scratch, page_query, run_page_query
 from msgflow.view.sql_page import examples, words
-from msgflow.view.summary import (
-    MOST_PATHS,
-    Section,
-    area_section,
-    blame_section,
-    encoded_comparison,
-    encoded_section,
-    query_section,
-    why_section,
-)
 from msgflow.view.table_encoding import encode, encode_result
 
 if TYPE_CHECKING:
@@ -105,16 +96,16 @@ class Pages:
             return ANSWERS[name](self, asked)
         raise UsageError(f"pages have no such data — {name}")
 
-    def summary(self, asked: Question, name: str, through: str = "") -> Section:
+    def summary(self, asked: Question, name: str, through: str = "") -> summary.Section:
         """Return a section of the summary: 'why', 'paths', 'blame', 'drops' or 'threads'."""
         if name not in SUMMARY:
             raise UsageError(f"the summary has no such section — {name}")
         if name == "why":
-            return why_section(asked)
+            return summary.why_section(asked)
         if name != "blame":
-            return query_section(asked, name, through)
+            return summary.query_section(asked, name, through)
         paths = [row["path_id"] for row in asked.rows("path").to_pylist() if through in row["path"]]
-        return blame_section(asked, self.slowest_takes(asked, paths)[:MOST_PATHS])
+        return summary.blame_section(asked, self.slowest_takes(asked, paths)[: summary.MOST_PATHS])
 
     def slowest_flows(self, asked: Question) -> list[dict[str, Any]]:
         """Return the slowest flow of each path that began in the window, the slowest first."""
@@ -167,7 +158,7 @@ class Pages:
         return encode(table, meta=meta, units=_units("segments"))
 
     def _summary(self, asked: Question) -> bytes:
-        return encoded_section(self.summary(asked, asked.text("part")), asked.origin_ns)
+        return summary.encoded_section(self.summary(asked, asked.text("part")), asked.origin_ns)
 
 
 def named(asked: Question, name: str) -> tuple[QueryResult, bytes]:
@@ -203,7 +194,9 @@ def _area(_: Pages, asked: Question) -> bytes:
         of = None
     if not of or not isinstance(of, list) or not all(isinstance(one, str | int) for one in of):
         raise UsageError(f"sums are of a list of names or identities — {asked.params.get('of')}")
-    return encoded_section(area_section(asked, asked.text("part"), of), asked.origin_ns)
+    return summary.encoded_section(
+        summary.area_section(asked, asked.text("part"), of), asked.origin_ns
+    )
 
 
 def _finding(_: Pages, asked: Question) -> bytes:
@@ -269,7 +262,7 @@ def _compare(_: Pages, asked: Question) -> bytes:
         asked.connection, str(asked.whole("other")), str(asked.run.run_id), what=what,
         resamples=0 if is_quick else None,
     )  # fmt: skip
-    return encoded_comparison(comparison, what, is_quick=is_quick)
+    return summary.encoded_comparison(comparison, what, is_quick=is_quick)
 
 
 def critical_path(asked: Question) -> bytes:

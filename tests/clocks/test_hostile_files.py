@@ -59,10 +59,10 @@ def test_only_regular_files_of_some_size_are_read(tmp_path: Path, read: object) 
     with large.open("wb") as file:
         file.truncate(1 << 40)
     for path, message in (
-        (pipe, "not a regular file"),
-        (Path("/dev/zero"), "not a regular file"),
-        (tmp_path, "is a directory"),
-        (large, f"larger than {MOST_BYTES // 1000} kB"),
+        (pipe, "a pipe, no file"),
+        (Path("/dev/zero"), "a device, no file"),
+        (tmp_path, "a directory, no file"),
+        (large, f"more than the {MOST_BYTES:,} that make sense"),
     ):
         with pytest.raises(UsageError, match=message):
             read(path)

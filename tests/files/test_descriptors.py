@@ -18,7 +18,7 @@ def descriptors() -> int:
 
 def test_a_directory_leaves_no_descriptor(tmp_path: Path) -> None:
     before = descriptors()
-    with pytest.raises(UsageError, match="is a directory"):
+    with pytest.raises(UsageError, match="a directory, no file"):
         read_text(tmp_path, "cannot read the file", "give a file")
     assert descriptors() == before
     with pytest.raises(OSError, match="a directory, no file"):
@@ -29,7 +29,7 @@ def test_a_directory_leaves_no_descriptor(tmp_path: Path) -> None:
 def test_a_pipe_leaves_no_descriptor(tmp_path: Path) -> None:
     os.mkfifo(pipe := tmp_path / "pipe")
     before = descriptors()
-    with pytest.raises(UsageError, match="not a regular file"):
+    with pytest.raises(UsageError, match="a pipe, no file"):
         read_text(pipe, "cannot read the file", "give a file")
     with pytest.raises(OSError, match="a pipe, no file"):
         open_regular(pipe)

@@ -342,10 +342,9 @@ def test_what_may_pass_is_tried_again(
     ],
 )
 def test_too_little_memory_is_told_from_other_errors(error: Exception) -> None:
-    assert child_process.failed_outcome(error, "answers", 1.0).reason == "too_large"
+    assert child_process.failed_outcome(error, "answers").reason == "too_large"
     assert (
-        child_process.failed_outcome(UsageError("no such query"), "answers", 1.0).reason
-        != "too_large"
+        child_process.failed_outcome(UsageError("no such query"), "answers").reason != "too_large"
     )
 
 

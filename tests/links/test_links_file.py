@@ -93,7 +93,7 @@ def test_mistakes_have_their_line(tmp_path: Path, text: str, message: str) -> No
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     for path, message in (
         (tmp_path / "none.yaml", "no such file or directory"),
-        (tmp_path, "is a directory"),
+        (tmp_path, "a directory, no file"),
         (write(tmp_path, b"\xff\xfe\x00links"), "not a text file in UTF-8"),
     ):
         with pytest.raises(UsageError) as caught:

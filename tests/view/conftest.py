@@ -20,8 +20,8 @@ from served import Page, Served
 from msgflow.database import open_db
 from msgflow.db.connection import connect
 from msgflow.ingest import ingest
-from msgflow.view import pages as view_pages
 from msgflow.view import report as view_report
+from msgflow.view import summary as view_summary
 from msgflow_sim import simulate
 
 
@@ -29,7 +29,7 @@ from msgflow_sim import simulate
 def _one_flow_taken_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each summary: every other one is a query more, that shows the same of another path."""
     if thorough.is_quick:
-        monkeypatch.setattr(view_pages, "MOST_PATHS", 1)
+        monkeypatch.setattr(view_summary, "MOST_PATHS", 1)
 
 
 @pytest.fixture(scope="session")

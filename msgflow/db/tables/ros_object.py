@@ -21,45 +21,51 @@ _IS_INFERRED = column(
     "is_inferred", "Its initialisation was not traced", BOOLEAN, sql="self.created_ns IS NULL"
 )
 
-table(
-    "publisher",
-    key("publisher_id", "Identity of the publisher"),
-    process_id(),
-    node_id(),
-    text("topic_name", "Fully expanded topic name"),
-    handle("publisher_handle", "rcl publisher handle"),
-    handle("rmw_handle", "rmw publisher handle"),
-    column("gid", "Global identifier, 16 bytes; NULL: none", BLOB),
-    number("queue_depth", "History depth asked for"),
-    moment("created_ns", "First initialisation event", clock="process_id"),
-    flag("is_internal", "Infrastructure of ROS (/rosout, /parameter_events, ...)"),
-    flag("is_inferred", "Its initialisation was not traced"),
-    flag("is_topic_learned", "Its topic was deduced from a link", is_hidden=True),
-    flag("is_topic_declared", "Its topic was given by a file of links"),
-    flag("is_agnocast", "Its messages pass through the shared memory of Agnocast"),
-    comment="One row per publisher",
-    view="Publishers, those of ROS itself marked as internal.",
-)
 
-table(
-    "subscription",
-    key("subscription_id", "Identity of the subscription"),
-    process_id(),
-    node_id(),
-    text("topic_name", "Fully expanded topic name"),
-    handle("subscription_handle", "rcl subscription handle"),
-    handle("rmw_handle", "rmw subscription handle"),
-    column("gid", "Global identifier, 16 bytes; NULL: none", BLOB),
-    number("queue_depth", "History depth asked for"),
-    moment("created_ns", "First initialisation event", clock="process_id"),
-    flag("is_internal", "Infrastructure of ROS (/parameter_events, /clock, ...)"),
-    flag("is_inferred", "Its initialisation was not traced"),
-    flag("is_topic_learned", "Its topic was deduced from a link", is_hidden=True),
-    flag("is_topic_declared", "Its topic was given by a file of links"),
-    flag("is_agnocast", "Its messages pass through the shared memory of Agnocast"),
-    comment="One row per subscription",
-    view="Subscriptions, those of ROS itself marked as internal.",
-)
+def _topic_endpoint(kind: str, internal: str) -> None:
+    """Define the table of publishers or subscriptions."""
+    table(
+        kind,
+        key(f"{kind}_id", f"Identity of the {kind}"),
+        process_id(),
+        node_id(),
+        text("topic_name", "Fully expanded topic name"),
+        handle(f"{kind}_handle", f"rcl {kind} handle"),
+        handle("rmw_handle", f"rmw {kind} handle"),
+        column("gid", "Global identifier, 16 bytes; NULL: none", BLOB),
+        number("queue_depth", "History depth asked for"),
+        moment("created_ns", "First initialisation event", clock="process_id"),
+        flag("is_internal", f"Infrastructure of ROS ({internal}, ...)"),
+        flag("is_inferred", "Its initialisation was not traced"),
+        flag("is_topic_learned", "Its topic was deduced from a link", is_hidden=True),
+        flag("is_topic_declared", "Its topic was given by a file of links"),
+        flag("is_agnocast", "Its messages pass through the shared memory of Agnocast"),
+        comment=f"One row per {kind}",
+        view=f"{kind.capitalize()}s, those of ROS itself marked as internal.",
+    )
+
+
+def _service_endpoint(kind: str, words: str, gid: str) -> None:
+    """Define the table of services or clients."""
+    table(
+        kind,
+        key(f"{kind}_id", f"Identity of the {kind}"),
+        process_id(),
+        node_id(),
+        text("service_name", "Fully expanded service name"),
+        handle(f"{kind}_handle", f"rcl {kind} handle"),
+        handle("rmw_handle", f"rmw {kind} handle"),
+        column("gid", f"{gid}, 16 bytes; NULL: none", BLOB),
+        moment("created_ns", f"rcl_{kind}_init", clock="process_id"),
+        flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
+        comment=f"One row per {words}",
+        view=f"{words.capitalize()}s, those of ROS itself marked as internal.",
+        computed=(_IS_INFERRED,),
+    )
+
+
+_topic_endpoint("publisher", "/rosout, /parameter_events")
+_topic_endpoint("subscription", "/parameter_events, /clock")
 
 table(
     "untraced_reader",
@@ -84,34 +90,5 @@ table(
     computed=(_IS_INFERRED,),
 )
 
-table(
-    "service",
-    key("service_id", "Identity of the service"),
-    process_id(),
-    node_id(),
-    text("service_name", "Fully expanded service name"),
-    handle("service_handle", "rcl service handle"),
-    handle("rmw_handle", "rmw service handle"),
-    column("gid", "Global identifier, 16 bytes; NULL: none", BLOB),
-    moment("created_ns", "rcl_service_init", clock="process_id"),
-    flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
-    comment="One row per service",
-    view="Services, those of ROS itself marked as internal.",
-    computed=(_IS_INFERRED,),
-)
-
-table(
-    "client",
-    key("client_id", "Identity of the client"),
-    process_id(),
-    node_id(),
-    text("service_name", "Fully expanded service name"),
-    handle("client_handle", "rcl client handle"),
-    handle("rmw_handle", "rmw client handle"),
-    column("gid", "Identifier that servers see, 16 bytes; NULL: none", BLOB),
-    moment("created_ns", "rcl_client_init", clock="process_id"),
-    flag("is_internal", "Infrastructure of ROS (parameter and lifecycle services)"),
-    comment="One row per service client",
-    view="Service clients, those of ROS itself marked as internal.",
-    computed=(_IS_INFERRED,),
-)
+_service_endpoint("service", "service", "Global identifier")
+_service_endpoint("client", "service client", "Identifier that servers see")

@@ -195,11 +195,8 @@ class _PacketFinder:
         known = [begin for begin in self._index if offset < begin < self._file_size]
         if known:
             return min(known)
-        if self._patterns:
-            found = self._find(offset + 1, self._file_size)
-            if found is not None:
-                return found
-        return self._file_size
+        found = self._find(offset + 1, self._file_size) if self._patterns else None
+        return self._file_size if found is None else found
 
     def _find(self, begin: int, end: int) -> int | None:
         """Return the first offset in a part of the file at which a packet seems to begin."""
