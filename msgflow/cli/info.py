@@ -56,6 +56,8 @@ def command(
         )
         for section in SECTIONS
     }
+    # A pager may read the rest for long: others can write to the database meanwhile.
+    database.close()
     is_brief = output is None and is_screen() and not wide
     print_sections(results, form, output, partial(screen_sections, results) if is_brief else None)
     for section, result in results.items():

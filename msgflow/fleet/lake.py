@@ -80,7 +80,7 @@ class Lake:
                 "give an empty or a new place with --lake",
             )
         if create:
-            # Also where it exists: so it fails now if nothing can be written.
+            # Also where it exists: so it fails now if nothing can be written, not later.
             store.put(ABOUT, about())
         return cls(store)
 
