@@ -60,9 +60,7 @@ def do(task: Task, directory: Path) -> Outcome:
     try:
         values = _values(task, directory, enter)
         return Outcome(
-            values=values,
-            signature=values["source_signature"],
-            seconds=time.monotonic() - begin,
+            values=values, signature=values["source_signature"], seconds=time.monotonic() - begin
         )
     except Exception as error:
         return failed_outcome(error, stage, time.monotonic() - begin)
