@@ -10,12 +10,7 @@ from msgflow.cli.operation import header_option, operation
 from msgflow.cli.options import SELECTION
 from msgflow.cli.output import is_screen, print_note
 from msgflow.cli.query_command import build_command, choice_of, chosen_by
-from msgflow.cli.sections import (
-    SectionsFormat,
-    chosen_format,
-    print_sections,
-    screen_sections,
-)
+from msgflow.cli.sections import SectionsFormat, chosen_format, print_sections, screen_sections
 from msgflow.database import Database
 from msgflow.query.catalogue import load_query
 
