@@ -62,6 +62,8 @@ def command(
     notes = [*clocks, *share_of_cpu(database, chosen)]
     if detail:
         notes += part_of_latencies(database, database.query("e2e-latency", run=run))
+    # A pager may read the rest for long: others can write to the database meanwhile.
+    database.close()
     labels = {one.run_id: one.title for one in runs} if len(runs) > 1 else {}
     if is_text:
         print_lines(_text(findings, labels))

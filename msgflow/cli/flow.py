@@ -62,7 +62,8 @@ def command(
     Times count from the first line. NA means that the trace does not show it.
 
     Args:
-        place: Topic of the message, or node; or one of the options below.
+        place: The first message on this topic, or what this node did first, at or after --at; or
+            one of the options below.
         slowest (N): The N slowest flows, each back from its last message.
         why: What the message waited for, as the query critical-path has it.
         case: With --slowest or --why: flows that count: first or last arrival of each root, newest

@@ -32,10 +32,7 @@ def _options(*, form: Literal[_OfGraphs, _OfRows] | None = None) -> None:
 def asked(words: list[str]) -> Any:
     """Return the command of the query."""
     return build_command(
-        chosen_by("graph", words),
-        form=next(parameters_of(_options)),
-        form_of=_form,
-        write=_write,
+        chosen_by("graph", words), form=next(parameters_of(_options)), form_of=_form, write=_write
     )
 
 

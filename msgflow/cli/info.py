@@ -10,12 +10,7 @@ from msgflow.cli.operation import header_option, operation
 from msgflow.cli.options import SELECTION
 from msgflow.cli.output import is_screen, print_note
 from msgflow.cli.query_command import build_command, choice_of, chosen_by
-from msgflow.cli.sections import (
-    SectionsFormat,
-    chosen_format,
-    print_sections,
-    screen_sections,
-)
+from msgflow.cli.sections import SectionsFormat, chosen_format, print_sections, screen_sections
 from msgflow.database import Database
 from msgflow.query.catalogue import load_query
 
@@ -56,6 +51,8 @@ def command(
         )
         for section in SECTIONS
     }
+    # A pager may read the rest for long: others can write to the database meanwhile.
+    database.close()
     is_brief = output is None and is_screen() and not wide
     print_sections(results, form, output, partial(screen_sections, results) if is_brief else None)
     for section, result in results.items():

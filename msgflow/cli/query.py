@@ -8,11 +8,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from msgflow.cli.output import print_list
-from msgflow.cli.query_command import (
-    build_command,
-    chosen_by,
-    print_options_of_every_query,
-)
+from msgflow.cli.query_command import build_command, chosen_by, print_options_of_every_query
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import COMMANDS, load_queries, load_query, query_names
 

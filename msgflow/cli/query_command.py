@@ -13,13 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 from typer.core import TyperCommand, TyperOption
 
-from msgflow.cli.operation import (
-    escape,
-    given_of,
-    header_parameter,
-    parameters_of,
-    set_parameters,
-)
+from msgflow.cli.operation import escape, given_of, header_parameter, parameters_of, set_parameters
 from msgflow.cli.options import DefaultGroup, one_text, plain
 from msgflow.cli.output import print_lines, print_result
 from msgflow.database import Database

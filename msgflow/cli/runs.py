@@ -71,10 +71,7 @@ def label(database: Database, run: _Runs, labels: list[str]) -> None:
 @app.command("remove")
 @operation
 def remove(
-    database: Database,
-    run: _Runs,
-    *,
-    yes: Annotated[bool, typer.Option("--yes", "-y")] = False,
+    database: Database, run: _Runs, *, yes: Annotated[bool, typer.Option("--yes", "-y")] = False
 ) -> None:
     """Remove a run with all that is known of it; what other runs have stays as it is.
 

@@ -16,7 +16,6 @@ from msgflow.text.wrapping import wrap
 if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
 
-
 SectionsFormat = Literal["table", "json", "markdown"]
 """Formats of several tables; the queries write each table in any format."""
 _SUFFIXES: dict[str, SectionsFormat] = {".txt": "table", ".json": "json", ".md": "markdown"}
@@ -31,12 +30,11 @@ def chosen_format(form: SectionsFormat | None, output: Path | None) -> SectionsF
 
 def print_sections(
     results: Mapping[str, QueryResult],
-    form: SectionsFormat | None,
+    form: SectionsFormat,
     output: Path | None,
     brief: Callable[[int], Iterator[str]] | None,
 ) -> None:
     """Print results; `brief` returns the lines of a table of a width, where people read it."""
-    form = chosen_format(form, output)
     if form == "json":
         lines = _json_lines(results)
     elif form == "table" and brief is not None:

@@ -31,11 +31,7 @@ _TARGETS = "targets.yaml"
 @app.command("links")
 @operation
 def links(
-    database: Database,
-    *,
-    run: str | None = None,
-    apply: bool = False,
-    output: Path | None = None,
+    database: Database, *, run: str | None = None, apply: bool = False, output: Path | None = None
 ) -> None:
     """Print links that the data suggest, as a file to review.
 

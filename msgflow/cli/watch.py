@@ -304,10 +304,7 @@ def _record(
     # A file, since the program would stop if it wrote to a full pipe.
     log = _free(f"{directory or name}.log") if on_screen and sys.stderr.isatty() else None
     ended = Event()
-    with (
-        temporary_directory(TEMPORARY) as temporary,
-        ThreadPoolExecutor(1) as beside,
-    ):
+    with temporary_directory(TEMPORARY) as temporary, ThreadPoolExecutor(1) as beside:
         target = (directory or temporary / "recording").absolute()
         # The main thread records: it has the signals.
         watching = beside.submit(live, target, ended.is_set)

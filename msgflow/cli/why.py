@@ -11,12 +11,7 @@ from typing import TYPE_CHECKING, Unpack
 
 from msgflow.cli.operation import asks
 from msgflow.cli.output import database_option, print_note, print_runs, print_status
-from msgflow.cli.sections import (
-    SectionsFormat,
-    chosen_format,
-    print_sections,
-    screen_sections,
-)
+from msgflow.cli.sections import SectionsFormat, chosen_format, print_sections, screen_sections
 from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.run.slice import SliceWords
@@ -41,10 +36,7 @@ _SHOWN = {
         "what kept its callbacks waiting",
         "node callback meanwhile_node meanwhile_callback meanwhile_thread worst_ns",
     ),
-    "losses": (
-        "messages not delivered",
-        "topic_name subscriber published dropped lost reasons",
-    ),
+    "losses": ("messages not delivered", "topic_name subscriber published dropped lost reasons"),
 }
 # Parts and activities as an engineer says them; docs/glossary.md explains each.
 _WORDS = {

@@ -44,8 +44,7 @@ def derive(
         synchronise()
     derive_from_clocks(con, run_id, findings=findings)
     con.execute(
-        "UPDATE store.run SET derivation_hash = ? WHERE run_id = ?",
-        [derivation_hash(), run_id],
+        "UPDATE store.run SET derivation_hash = ? WHERE run_id = ?", [derivation_hash(), run_id]
     )
 
 

@@ -79,9 +79,7 @@ class Selection:
         return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
     def _read(
-        self,
-        wanted: dict[str, pa.Schema | None],
-        progress: Callable[[Progress], None] | None,
+        self, wanted: dict[str, pa.Schema | None], progress: Callable[[Progress], None] | None
     ) -> Iterator[list[EventBatch]]:
         self.lost_event_count = 0
         batches = self.traces.batches(wanted, progress=progress, batch_rows=BATCH_ROWS)

@@ -51,10 +51,7 @@ _REQUEST = {
     "response": "no response was seen",
 }
 _NOT_SEEN = {
-    "take": {
-        "publication": "its publication was not seen",
-        "callback": "no callback was seen",
-    },
+    "take": {"publication": "its publication was not seen", "callback": "no callback was seen"},
     "callback_instance": {"take": "its message was not seen"},
     "request": _REQUEST,
     "response": _REQUEST,

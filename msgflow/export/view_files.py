@@ -22,11 +22,7 @@ _PARTITION = "run_id"
 
 
 def export_parquet(
-    connection: duckdb.DuckDBPyConnection,
-    directory: Path,
-    selection: Selection,
-    *,
-    force: bool,
+    connection: duckdb.DuckDBPyConnection, directory: Path, selection: Selection, *, force: bool
 ) -> tuple[ExportedView, ...]:
     """Write views to `directory/VIEW/run_id=ID/data.parquet`, all or none, rows in order."""
     import pyarrow.parquet
@@ -56,11 +52,7 @@ def export_parquet(
 
 
 def export_csv(
-    connection: duckdb.DuckDBPyConnection,
-    directory: Path,
-    selection: Selection,
-    *,
-    force: bool,
+    connection: duckdb.DuckDBPyConnection, directory: Path, selection: Selection, *, force: bool
 ) -> tuple[ExportedView, ...]:
     """Write views to `directory/VIEW.csv`, all of them or none, rows sorted by all columns."""
     names = {view: f"{view}.csv" for view in selection.views}

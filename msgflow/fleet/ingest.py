@@ -253,9 +253,7 @@ class _Ingest:
         source = item.recording.source
         assert item.state is not None
         memory, disk = needs(
-            item.state.size,
-            is_archive=item.state.is_archive,
-            is_remote=source.startswith(S3),
+            item.state.size, is_archive=item.state.is_archive, is_remote=source.startswith(S3)
         )
         task = Task(
             item.index,

@@ -67,7 +67,7 @@ class Lake:
                 "give an empty or a new place with --lake",
             )
         if create:
-            # Also where it exists: so it fails now if nothing can be written.
+            # Also where it exists: so it fails now if nothing can be written, not later.
             store.put(layout.ABOUT, layout.about())
         return cls(store)
 

@@ -90,10 +90,7 @@ class Latest:
             self._values[origin] = np.append(values, more)
 
     def before(
-        self,
-        groups: Groups,
-        is_member: NDArray[Any],
-        events: Mapping[Any, NDArray[Any]],
+        self, groups: Groups, is_member: NDArray[Any], events: Mapping[Any, NDArray[Any]]
     ) -> dict[Any, NDArray[Any]]:
         """Return the latest event before each one of `groups`; remember the last of the round."""
         places = np.arange(is_member.size, dtype=np.int32)

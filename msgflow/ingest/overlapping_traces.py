@@ -118,11 +118,7 @@ def corrections_of(con: duckdb.DuckDBPyConnection) -> Corrections:
     processes = _process(known["session"], known["vpid"], numbers, len(names))
     order = np.argsort(processes)
     return Corrections(
-        duplicates,
-        processes[order],
-        np.asarray(known["pid_ns"], np.int64)[order],
-        sessions,
-        names,
+        duplicates, processes[order], np.asarray(known["pid_ns"], np.int64)[order], sessions, names
     )
 
 

@@ -49,9 +49,7 @@ def require_ros_traces(traces: Sequence[TraceInfo]) -> None:
 
 
 def require_ros_events(
-    traces: Sequence[TraceInfo],
-    counts: Mapping[tuple[int, str], int],
-    damages: Sequence[Damage],
+    traces: Sequence[TraceInfo], counts: Mapping[tuple[int, str], int], damages: Sequence[Damage]
 ) -> None:
     """Raise unless at least one event that msgflow knows was read."""
     total: Counter[str] = Counter()

@@ -57,8 +57,7 @@ class PathsFile:
         known = [path.name.value for path in self.paths]
         others = f"it has {', '.join(known[:10]) or 'none; msgflow suggest paths finds some'}"
         raise UsageError(
-            f"{self.file.path} has no path of this name — {name}",
-            did_you_mean(name, known, others),
+            f"{self.file.path} has no path of this name — {name}", did_you_mean(name, known, others)
         )
 
     def require(

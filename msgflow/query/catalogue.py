@@ -124,9 +124,7 @@ def _header(name: str) -> Header:
         words = f" {value}" if own[0].choices else ""
         header = replace(header, chosen=f"{base} --{own[0].name}{words}", variants=variants)
     return replace(
-        header,
-        is_command=(base or name) in COMMANDS,
-        params=(*header.variants, *header.params),
+        header, is_command=(base or name) in COMMANDS, params=(*header.variants, *header.params)
     )
 
 

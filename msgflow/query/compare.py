@@ -16,13 +16,7 @@ from msgflow.files.resources import resource_directory
 from msgflow.query.catalogue import load_query
 from msgflow.query.differences import STATISTICS, Differences
 from msgflow.query.names import require_places
-from msgflow.query.notes import (
-    AMBIGUOUS,
-    clock_notes,
-    doubt_notes,
-    function_notes,
-    schedule_notes,
-)
+from msgflow.query.notes import AMBIGUOUS, clock_notes, doubt_notes, function_notes, schedule_notes
 from msgflow.query.runner import bind, run_query
 from msgflow.query.selection import CUT_COLUMN
 from msgflow.result.query_result import QueryResult

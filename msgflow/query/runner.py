@@ -59,9 +59,7 @@ class Steps:
     """
 
     def __init__(
-        self,
-        connection: duckdb.DuckDBPyConnection,
-        known: Mapping[str, str] | None = None,
+        self, connection: duckdb.DuckDBPyConnection, known: Mapping[str, str] | None = None
     ) -> None:
         self._connection = connection
         self._known = known or {}
@@ -133,8 +131,7 @@ def run_query(
     """
     if part.has_window and not header.has_window:
         raise UsageError(
-            f"the query has no time window — {header.words}",
-            "leave out --start and --end",
+            f"the query has no time window — {header.words}", "leave out --start and --end"
         )
     runs = part.runs(connection) if runs is None else runs
     window = part.window(runs)
@@ -221,8 +218,7 @@ def _checked(command: str, param: Param, value: Value) -> Value:
             value = parse_text(value, param.type)
         except ValueError:
             raise UsageError(
-                f"{option} takes {described_type(param.type)} — {value}",
-                f"{command} --help",
+                f"{option} takes {described_type(param.type)} — {value}", f"{command} --help"
             ) from None
     if param.choices and value is not None and value not in param.choices:
         raise UsageError(
@@ -231,8 +227,7 @@ def _checked(command: str, param: Param, value: Value) -> Value:
         )
     if param.minimum is not None and isinstance(value, int) and value < param.minimum:
         raise UsageError(
-            f"{option} is at least {param.minimum} — {value}",
-            f"{command} {option} {param.minimum}",
+            f"{option} is at least {param.minimum} — {value}", f"{command} {option} {param.minimum}"
         )
     return value
 

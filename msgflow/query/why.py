@@ -123,10 +123,7 @@ class Explanation:
 
 
 def explain(
-    connection: duckdb.DuckDBPyConnection,
-    run: Run,
-    times: Slice,
-    place: str | None = None,
+    connection: duckdb.DuckDBPyConnection, run: Run, times: Slice, place: str | None = None
 ) -> Explanation:
     """Return why flows of a run are late that end at a place; raise NoFlowError if none does."""
     with Steps(connection, _KNOWN) as steps:

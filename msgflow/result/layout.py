@@ -208,8 +208,7 @@ def _measured(
         piece = max(map(longest_piece, cells), default=0)
         narrow = _NARROW if lines == _LINES else _NARROW_OF_ALL
         broken = min(
-            width,
-            max(cell_len(title), min(piece, _WORD), narrow, -(-most * 5 // (4 * lines))),
+            width, max(cell_len(title), min(piece, _WORD), narrow, -(-most * 5 // (4 * lines)))
         )
         least = width if width <= _SHORT else min(width, max(broken, min(word, _WORD)))
     return ShownColumn(name, title, tuple(cells), is_number, width, least, broken)
@@ -375,11 +374,7 @@ def _is_alike(column: ShownColumn) -> bool:
 
 
 def _not_shown(
-    columns: Sequence[ShownColumn],
-    nothing: Sequence[str],
-    zero_rows: int,
-    width: int,
-    remedy: str,
+    columns: Sequence[ShownColumn], nothing: Sequence[str], zero_rows: int, width: int, remedy: str
 ) -> str | None:
     """Return one line that names columns, with the value of those alike in all rows."""
     alike = [column for column in columns if _is_alike(column)]

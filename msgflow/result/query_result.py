@@ -68,8 +68,7 @@ class QueryResult(Rows):
             )
         if self.header is None and times != "ns":
             raise UsageError(
-                "plain SQL does not say which numbers are times",
-                "use a query: msgflow query",
+                "plain SQL does not say which numbers are times", "use a query: msgflow query"
             )
         return replace(self, table=converted(self.table, self.units, self.runs, times))
 

@@ -19,8 +19,7 @@ _FULL = re.compile(r"no space left|disk quota|max_temp_directory_size|not enough
 _REFUSED = re.compile(r"permission denied|read-only file system|operation not permitted", re.I)
 # A block with a wrong checksum raises the base class of all errors.
 _DAMAGE = re.compile(
-    r"corrupt|checksum|deserializ|invalid unicode|could not read|failed to load metadata",
-    re.I,
+    r"corrupt|checksum|deserializ|invalid unicode|could not read|failed to load metadata", re.I
 )
 # DuckDB 2.0 sometimes fails when dictionaries of strings pass through several joins. The same
 # statement seldom fails twice (similar: duckdb/duckdb#24807).

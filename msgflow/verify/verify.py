@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import fnmatch
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from fnmatch import fnmatchcase
 from functools import cache
+from operator import eq
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -325,8 +326,8 @@ def _vanished(connection: duckdb.DuckDBPyConnection, file: TargetsFile, run: Run
         for text, one in wanted:
             there = names(one.names)
             # Topics of a path are no patterns.
-            is_pattern = text not in target.topics
-            if text.value in there or (is_pattern and fnmatch.filter(there, text.value)):
+            fits = eq if text in target.topics else fnmatchcase
+            if text.value in there or any(fits(name, text.value) for name in there):
                 continue
             more = f" and {len(there) - 5} more" if len(there) > 5 else ""
             some = f"{', '.join(there[:5])}{more}" if there else f"no {one.what} at all"

@@ -94,8 +94,7 @@ def single_page(parts: Mapping[str, bytes], head: Mapping[str, Any]) -> str:
     scripts = [*(vendored(name) for name in SCRIPTS), joined()]
     styles = [*(vendored(name) for name in SHEETS), text("style.css")]
     policy = _POLICY.format(
-        scripts=" ".join(map(source_hash, scripts)),
-        styles=" ".join(map(source_hash, styles)),
+        scripts=" ".join(map(source_hash, scripts)), styles=" ".join(map(source_hash, styles))
     )
     # The browser runs scripts at the end of the page, behind the data.
     body = [f'<script type="application/octet-stream" id="msgflow-data">{packed}</script>']

@@ -150,9 +150,7 @@ class Pages:
             whole = Window(asked.origin_ns, asked.origin_ns + asked.length_ns + 1)
             # The bars of the whole run are counted once.
             self._scratch.fill(
-                "level",
-                asked.run.run_id,
-                lambda: asked.rows("segments", whole, bin_ns=level_ns),
+                "level", asked.run.run_id, lambda: asked.rows("segments", whole, bin_ns=level_ns)
             )
             table = self._scratch.ask("level", asked.frame() | {"bin_ns": meta["bin"]})
         return encode(table, meta=meta, units=_units("segments"))

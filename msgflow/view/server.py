@@ -162,13 +162,7 @@ def application(
         except duckdb.Error as error:
             return _failure(QueryError(first_line(error)), 500, "failed")
 
-    app = Starlette(
-        routes=[
-            Route("/", page),
-            Route("/{name}", file),
-            Route("/api/{name}", data),
-        ]
-    )
+    app = Starlette(routes=[Route("/", page), Route("/{name}", file), Route("/api/{name}", data)])
     return Guard(app, token)
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import IO
 
 import duckdb
 import pytest
@@ -219,3 +221,25 @@ def test_findings_are_written_to_a_file(msgflow: Msgflow, database: Path, tmp_pa
     header, row = (tmp_path / "found.csv").read_text().splitlines()
     assert header.startswith('"number","run_id","trace_id","name","phase","severity","subject"')
     assert row.startswith('1,1,1,"tracing_paused","recording","warning","trace",1,')
+
+
+@pytest.mark.parametrize("words", [("check",), ("info",), ("flow", "--take", "1")])
+def test_others_may_write_to_the_database_while_somebody_reads(
+    words: tuple[str, ...], msgflow: Msgflow, database: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The output waits for as long as a pager does not take it."""
+    add(database, "gap", pause())
+    written = []
+
+    def slow() -> IO[bytes]:
+        if not written:
+            with duckdb.connect(str(database)) as connection:
+                connection.execute("CREATE TABLE main.others (number BIGINT)")
+            written.append(words)
+        return sys.stdout.buffer
+
+    monkeypatch.setattr("msgflow.cli.output.data_stream", slow)
+    result = msgflow(*words, "--db", database)
+    assert result.exit_code == 0, result.output
+    assert written
+    assert result.stdout

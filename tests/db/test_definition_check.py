@@ -17,6 +17,7 @@ from msgflow.db import migration, objects
 from msgflow.db.connection import connect, definitions
 from msgflow.db.runs import change_runs
 from msgflow.errors import DatabaseError
+from msgflow.files.yaml_file import YamlFile
 from msgflow.ingest import ingest
 from msgflow.links.annotations import apply_links
 from msgflow.links.links_file import LinksFile
@@ -52,8 +53,9 @@ def trace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def writers(trace: Path) -> tuple[Callable[[Path], object], ...]:
     """Return all that writes into a database."""
+    no_links = LinksFile(YamlFile(Path("x"), "", ""), ())
     return (
-        lambda path: change_runs(path, "all", partial(apply_links, file=LinksFile(Path("x"), ()))),
+        lambda path: change_runs(path, "all", partial(apply_links, file=no_links)),
         lambda path: msgflow.open_db(path).apply_clocks("none", run="all"),
         lambda path: ingest([trace], path),
         lambda path: msgflow.open_db(path).rename_run("noon", "evening"),

@@ -16,7 +16,6 @@ try:
 except ImportError:  # Windows has no such terminals
     termios = None  # type: ignore[assignment]
 
-
 # What terminals send: of a key that is held, several times at once.
 _KEY = re.compile(r"\x1b[\[O][\d;]*[A-Za-z~]|.", re.DOTALL)
 _NAMES = {"\x1b[A": "up", "\x1b[B": "down", "\x1bOA": "up", "\x1bOB": "down", "\x1b": "escape"}
