@@ -16,6 +16,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
+from msgflow.view.question import Question
 from served import Served
 from tables import decoded
 
@@ -24,7 +25,6 @@ from msgflow.errors import DatabaseInUseError
 from msgflow.view import pages
 from msgflow.view.kept_token import kept_token
 from msgflow.view.pages import Pages
-from msgflow.view.question import Question
 from msgflow.view.shared_database import SharedDatabase, UnopenedError
 
 HOLD = (
