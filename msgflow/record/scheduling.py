@@ -17,7 +17,6 @@ _NAMES = {
     "sched_waking": "sched:sched_waking",
     "sched_wakeup_new": "sched:sched_wakeup_new",
     "sched_migrate_task": "sched:sched_migrate_task",
-    "sched_process_fork": "sched:sched_process_fork",
     "power_cpu_frequency": "power:cpu_frequency",
     "irq_handler_entry": "irq:irq_handler_entry",
     "irq_handler_exit": "irq:irq_handler_exit",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -19,9 +19,6 @@ from msgflow.trace.regular_file import read_regular
 EVENTS = ("ros2:*", "dds:*", "ros2_caret:*", "agnocast:*")
 """The events that a recording has."""
 CONTEXTS = ("vpid", "vtid", "procname")
-KERNEL_CONTEXTS = ("pid", "vpid", "vtid", "procname")
-# LTTng has it since 2.12.
-_LATER_CONTEXT = "pid_ns"
 _CHANNEL = "ros2"
 # In the directory of a recording while it is made: the mark of its process.
 _OWNER = ".msgflow-record"
@@ -61,13 +58,13 @@ def recording_session(
         owner.unlink()
         raise
     try:
-        _set_up("--userspace", name, channel, CONTEXTS)
+        _set_up("--userspace", name, channel)
+        contexts = [f"--type={context}" for context in CONTEXTS]
+        lttng("add-context", *_to_channel("--userspace", name), *contexts)
         if with_kernel:
             # All in one call.
             of_kernel = replace(channel, events=(",".join(KERNEL_EVENTS),), without=())
-            _set_up("--kernel", name, of_kernel, KERNEL_CONTEXTS)
-            with suppress(RecordingError):
-                _add_contexts("--kernel", name, _LATER_CONTEXT)
+            _set_up("--kernel", name, of_kernel)
         if channel.rotation_ns is not None:
             _rotate(name, channel.rotation_ns)
         lttng("start", name)
@@ -161,7 +158,7 @@ def can_trace_kernel() -> bool:
     return True
 
 
-def _set_up(domain: str, name: str, channel: Channel, contexts: Sequence[str]) -> None:
+def _set_up(domain: str, name: str, channel: Channel) -> None:
     sizes = (f"--subbuf-size={channel.sub_buffer_size}", f"--num-subbuf={channel.sub_buffers}")
     lttng("enable-channel", domain, f"--session={name}", *sizes, _CHANNEL)
     for event in channel.events:
@@ -169,12 +166,6 @@ def _set_up(domain: str, name: str, channel: Channel, contexts: Sequence[str]) -
         out = [each for each in channel.without if fnmatchcase(each, event)]
         without = [f"--exclude={','.join(out)}"] if out else []
         lttng("enable-event", *_to_channel(domain, name), *without, event)
-    _add_contexts(domain, name, *contexts)
-
-
-def _add_contexts(domain: str, name: str, *contexts: str) -> None:
-    types = [f"--type={context}" for context in contexts]
-    lttng("add-context", *_to_channel(domain, name), *types)
 
 
 def _to_channel(domain: str, name: str) -> tuple[str, ...]:

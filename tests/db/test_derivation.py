@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import duckdb
@@ -14,6 +15,7 @@ from msgflow.db.sandbox import open_file
 from msgflow.files.resources import resource_directory
 from msgflow.ingest import ingest
 from msgflow.sql.header import parse
+from msgflow.sql.statement import RECORDED, recorded
 from msgflow_sim import Recording, simulate
 
 
@@ -160,3 +162,69 @@ def test_tables_have_no_row_without_those_of_their_when(
 
 def count(con: duckdb.DuckDBPyConnection, rows: str) -> int:
     return int(con.execute(f"SELECT count(*) FROM {rows}").fetchall()[0][0])
+
+
+MILLISECOND = 1_000_000
+# What derivations leave out where no recording has it, and the tables that do.
+LEFT_OUT = {
+    "has_unnamed", "has_gaps", "has_pauses", "has_steps", "has_orphans", "has_clocks",
+    "has_open_callbacks", "has_failed_takes",
+}  # fmt: skip
+# What to do before: else takes are found again, and nothing is of one clock.
+BEFORE = {
+    "has_orphans": "DELETE FROM store.take AS t USING store.orphan_take AS o "
+    "WHERE t.take_id = o.take_id",
+    "has_clocks": "UPDATE store.host SET clock_id = 1; DELETE FROM store.clock WHERE clock_id > 1",
+}
+LEAVING_OUT = ("link_transport", "orphan_take", "undelivered")
+
+
+def test_all_that_derivations_leave_out_is_tried() -> None:
+    texts = {each.name: each.body for each in objects.views() if each.name.startswith("derive.")}
+    derived = objects.sources_of(f"derive.{name}" for name in derivation.derived_tables())
+    using = {name for name in derived & texts.keys() if re.search(r"has_\w+ := ", texts[name])}
+    assert {fact for name in using for fact in RECORDED if f"{fact} := " in texts[name]} == LEFT_OUT
+
+
+@pytest.mark.thorough
+def test_what_no_recording_has_changes_no_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two runs, which have it all; one thing after the other is deleted."""
+    path = tmp_path / "run.duckdb"
+    pause = (1000 * MILLISECOND, 1100 * MILLISECOND)
+    for layout, recording in (
+        ("jazzy", Recording(start_ns=500 * MILLISECOND)),
+        ("humble", Recording(lost_event_share=0.4, pauses=(pause,))),
+    ):
+        simulate("two_hosts", tmp_path / layout, factor=0.3, layout=layout, recording=recording)
+        ingest([tmp_path / layout], path)
+    with open_file(path, read_only=False) as con:
+
+        def rows() -> dict[str, list[tuple[object, ...]]]:
+            for table in LEAVING_OUT:
+                derivation.derive_table(con, table, 1)
+                derivation.derive_table(con, table, 2)
+            return {
+                table: con.execute(f"FROM store.{table} ORDER BY ALL").fetchall()
+                for table in LEAVING_OUT
+            }
+
+        con.execute(  # threads that hang
+            "UPDATE store.callback_instance SET end_ns = NULL, is_loss_affected = false "
+            "WHERE callback_instance_id IN "
+            "(SELECT max(callback_instance_id) FROM store.callback_instance GROUP BY thread_id)"
+        )
+        assert all(recorded(con, sorted(LEFT_OUT)).values()), recorded(con, sorted(LEFT_OUT))
+        for fact in sorted(LEFT_OUT):
+            con.begin()
+            con.execute(BEFORE.get(fact, "SELECT 1"))
+            while recorded(con, [fact])[fact]:
+                for what in re.findall(r"FROM (store\.\w+(?: WHERE [^)]+)?)", RECORDED[fact]):
+                    con.execute(f"DELETE FROM {what}")
+            found = rows()
+            assert found["undelivered"], fact
+            with monkeypatch.context() as patched:
+                patched.setattr(derivation, "recorded", lambda _, names: dict.fromkeys(names, True))
+                assert rows() == found, fact
+            con.rollback()

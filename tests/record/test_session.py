@@ -13,25 +13,25 @@ from msgflow.record.lttng import Session
 from msgflow.record.session import Channel, recording_session
 
 
-@pytest.mark.parametrize("refused", [(), ("--type=pid_ns",)])
-def test_a_context_that_an_old_lttng_lacks_is_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: tuple[str, ...]
+def test_the_kernel_is_recorded_without_contexts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """What ran at the events of a thread tells which thread of the kernel it is."""
     said: list[tuple[str, ...]] = []
-
-    def lttng(*words: str) -> None:
-        if any(word in refused for word in words):
-            raise RecordingError("no such context", "another")
-        said.append(words)
-
-    monkeypatch.setattr(session, "lttng", lttng)
+    monkeypatch.setattr(session, "lttng", lambda *words: said.append(words))
     monkeypatch.setattr(session, "is_there", lambda name: True)
     with recording_session("robot", tmp_path, Channel(("ros2:*",), "1M", 4), with_kernel=True):
         pass
-    contexts = [word for words in said for word in words if word.startswith("--type=")]
-    of_kernel = contexts[3:]
-    assert of_kernel[:4] == ["--type=pid", "--type=vpid", "--type=vtid", "--type=procname"]
-    assert of_kernel[4:] == ([] if refused else ["--type=pid_ns"])
+    assert [words[1] for words in said if words[0] == "enable-channel"] == [
+        "--userspace",
+        "--kernel",
+    ]
+    ((_, domain, *_, first, second, third),) = [w for w in said if w[0] == "add-context"]
+    assert (domain, first, second, third) == (
+        "--userspace", "--type=vpid", "--type=vtid", "--type=procname",
+    )  # fmt: skip
+    (events,) = (w[-1] for w in said if w[:2] == ("enable-event", "--kernel"))
+    assert "sched_switch" in events.split(",")
     assert [words[0] for words in said][-2:] == ["start", "destroy"]
 
 

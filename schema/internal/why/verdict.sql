@@ -9,7 +9,7 @@
 --     'service', 'queue', 'lost', 'late_start', 'stale' or 'way'; or the name of a finding
 -- column: cost_ns BIGINT [ns]  By how much the data at the end of a path are older because of it;
 --     half of that where it only may be so; NULL: of findings
--- column: path VARCHAR [path]  Path that it delays most
+-- column: path VARCHAR [path]  Path that it delays most: of equal ones the first by name
 -- column: sentence VARCHAR  The sentence
 WITH step AS (
     SELECT DISTINCT unnest(string_split(path, ' → ')) AS name FROM path_row
@@ -50,8 +50,8 @@ found AS (
 ),
 chosen AS (
     SELECT
-        kind, who, what, arg_max(path, cost_ns) AS path, max(cost_ns) AS cost_ns,
-        arg_max(clause, cost_ns) AS clause
+        kind, who, what, arg_min(path, (-cost_ns, path)) AS path, max(cost_ns) AS cost_ns,
+        arg_min(clause, (-cost_ns, path)) AS clause
     FROM (
         SELECT
             kind, coalesce(who, '?') AS who, what, path, coalesce(cost_ns, 0) AS cost_ns, clause
@@ -71,7 +71,7 @@ told AS (
         who,
         list(kind ORDER BY cost_ns DESC, kind, what) AS kinds,
         max(cost_ns) AS cost_ns,
-        arg_max(path, cost_ns) AS path,
+        arg_min(path, (-cost_ns, kind, what)) AS path,
         printf('%s: %s', who, string_agg(clause, '; ' ORDER BY cost_ns DESC, kind, what))
             AS sentence
     FROM chosen
