@@ -80,4 +80,4 @@ FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 JOIN main.run AS r ON m.run_id = r.run_id
 JOIN main.callback AS c ON m.callback_id = c.callback_id
-ORDER BY m.run_id, p99_ns DESC NULLS LAST, l.node, l.label, m.callback_id
+ORDER BY m.run_id, m.duration.p99_ns DESC NULLS LAST, l.node, l.label, m.callback_id

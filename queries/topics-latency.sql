@@ -67,5 +67,5 @@ LEFT JOIN main.subscription AS s ON m.subscription_id = s.subscription_id
 LEFT JOIN main.process AS p ON s.process_id = p.process_id
 LEFT JOIN main.node AS n ON s.node_id = n.node_id
 ORDER BY
-    m.run_id, p99_ns DESC NULLS LAST, s.topic_name NULLS LAST, subscriber,
+    m.run_id, m.latency.p99_ns DESC NULLS LAST, s.topic_name NULLS LAST, subscriber,
     m.subscription_id
