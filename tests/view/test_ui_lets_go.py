@@ -16,7 +16,6 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from msgflow.view.question import Question
 from served import Served
 from tables import decoded
 
@@ -24,6 +23,7 @@ from msgflow.db.sandbox import opening
 from msgflow.errors import DatabaseInUseError
 from msgflow.view import pages
 from msgflow.view.kept_token import kept_token
+from msgflow.view.page_query import Question
 from msgflow.view.pages import Pages
 from msgflow.view.shared_database import SharedDatabase, UnopenedError
 
