@@ -121,7 +121,7 @@ def test_only_what_is_stored_is_skipped() -> None:
 
 # Those with rows in runs of other systems than of one without stamps, with losses.
 ELSEWHERE = {
-    ("agnocast", "jazzy"): {"derive.link_transport_agnocast"},
+    ("agnocast", "jazzy-agnocast"): {"derive.link_transport_agnocast"},
     ("calls", "rolling"): {"derive.flow_call", "derive.link_call"},
     ("intra_process", "jazzy"): {"derive.link_transport_ring_buffer"},
     ("python", "jazzy"): {"derive.link_causal_by_hand"},
