@@ -113,6 +113,11 @@ def test_a_flame_graph_says_what_samples_saw(
     assert {f"{_NAMES[0]}: 3 samples", f"{_NAMES[2]}: 1 sample"} <= set(titles)
     page.page.get_by_label("mark functions with this text").fill("<IMG")
     width = "() => +document.querySelector('.flame g[name=work] rect').getAttribute('width')"
+    # Frames grow into their places; before that their width is none to compare with.
+    page.page.wait_for_function(
+        f"async () => {{ const w = ({width})(); await new Promise(r => setTimeout(r, 500));"
+        f" return w === ({width})(); }}"
+    )
     before = page.page.evaluate(width)
     page.page.locator(".flame g[name='<img src=x onerror=hacked=1>']").click()
     page.page.get_by_text("33.3 %, 1 sample").wait_for()
