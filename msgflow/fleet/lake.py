@@ -101,7 +101,7 @@ class Lake:
 
     def _rows(self, name: str) -> pa.Table | None:
         """Return the rows of a file of the table `run`, None if there is no such file."""
-        hint = "check that nobody else than msgflow has written there"
+        hint = "check that only msgflow writes there"
         rows = self._read(layout.run_path(name), layout.RUN_SCHEMA, "the runs", hint)
         if rows is not None:
             _require_sound(rows, name, self.store.url_of(layout.run_path(name)))

@@ -265,5 +265,5 @@ def lake_errors(lake: Lake, *, is_query: bool = False) -> Iterator[None]:
             raise
         raise DatabaseError(
             f"cannot read the lake: {first_line(error)} — {lake.store.url}",
-            "check that it can be reached, and that nobody else than msgflow has written there",
+            "check that it can be reached, and that only msgflow writes there",
         ) from error

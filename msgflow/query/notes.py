@@ -125,7 +125,7 @@ def _not_traced(
 
 
 def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
-    """Return a note that names the processes of which no callbacks are known, if there are any."""
+    """Return a note that names processes without known callbacks, if there are any."""
     rows = connection.execute(
         "SELECT DISTINCT subject FROM main.finding "
         "WHERE list_contains($runs, run_id) AND name = 'process_without_rclcpp' ORDER BY subject",

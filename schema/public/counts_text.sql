@@ -1,5 +1,5 @@
--- description: The words of a group, each with how often it occurs, the most frequent first:
---     'a 3, b 1'. NULL where there is none.
+-- description: How often each word of a group occurs, as a text: 'a 3, b 1'. The most frequent word
+--     comes first. A group without words has NULL.
 -- param: word VARCHAR  Words of a group; NULL does not count
 CREATE OR REPLACE MACRO main.counts_text(word) AS
 nullif(array_to_string(

@@ -91,7 +91,7 @@ def test_a_violation_names_the_culprit_and_is_kept(violated) -> None:
     assert subjects == ["/scan → /filtered", "/scan → /filtered → /sink"]
     for violation in first["violations"]:
         assert violation["worst_ns"] == 99_343_279
-        assert "/filter ran 48.084 ms" in violation["culprit"]
+        assert "/filter ran 48.1 ms" in violation["culprit"]
     # The first sentence of `why` on that window.
     said = "/filter: its callback Subscription(/scan) takes 48.1 ms of 78 ms"
     assert first["violations"][0]["why"].startswith(said)

@@ -16,12 +16,7 @@ named AS (
             node, if(hop > 0, string_split($path, ' → ')[2 * hop - 1], NULL), 'an unknown node'
         ) AS node,
         coalesce(what, 'a message') AS what, coalesce(who, 'another thread') AS who,
-        CASE
-            WHEN abs(duration_ns) < 1e3 THEN printf('%d ns', duration_ns)
-            WHEN abs(duration_ns) < 1e6 THEN printf('%.3f µs', duration_ns / 1e3)
-            WHEN abs(duration_ns) < 1e9 - 500 THEN printf('%.3f ms', duration_ns / 1e6)
-            ELSE printf('%.3f s', duration_ns / 1e9)
-        END AS time
+        main.duration_text(duration_ns) AS time
     FROM slowest
     WHERE activity <> 'rest' AND share >= 0.2
 )
