@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import time
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -14,6 +15,9 @@ from msgflow.cli.options import LAKE_PAGE
 from msgflow.cli.output import print_note, print_status
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.sql.interrupt import Interrupts, noted_interrupts
+
+_SECONDS_BETWEEN_CHECKS = 0.1
 
 
 @operation
@@ -42,23 +46,26 @@ def command(
             4GB.
     """
     from msgflow.cli.sql_process import WarmSql
-    from msgflow.view.server import listening, running, single_application
+    from msgflow.view.server import serving, serving_application, single_application
     from msgflow.view.sql_page import MOST_SECONDS
 
-    def serve(server: Any, listener: Any, address: str) -> None:
+    def show(address: str, interrupts: Interrupts) -> None:
         print_status(address)
         print_status("Ctrl-C ends it")
         if browser and not _open(address):
             print_note("no browser could be opened here: open the address yourself")
-        server.run(sockets=[listener])
+        while True:
+            interrupts.check()
+            time.sleep(_SECONDS_BETWEEN_CHECKS)
 
     if lake is None:
         require_no_where(where)
         with (
             closing(WarmSql(database, memory_limit=memory_limit, seconds=MOST_SECONDS)) as sql,
-            running(database, sql, port=port, memory_limit=memory_limit) as served,
+            noted_interrupts() as interrupts,
+            serving(database, sql, port=port, memory_limit=memory_limit) as address,
         ):
-            serve(*served)
+            show(address, interrupts)
         return
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_page import lake_page
@@ -71,8 +78,11 @@ def command(
         return first.pop() if first else lake_page(opened, where=where).content
 
     place = lake if "://" in lake else os.path.realpath(lake)
-    with listening(place, port, lambda token: single_application(page, token)) as served:
-        serve(*served)
+    with (
+        noted_interrupts() as interrupts,
+        serving_application(place, port, lambda token: single_application(page, token)) as address,
+    ):
+        show(address, interrupts)
 
 
 def require_no_where(where: str | None) -> None:

@@ -260,7 +260,7 @@ def _pages(port: int | None, clock_sync: str) -> Iterator[WindowDatabase | None]
         database = WindowDatabase(path, clock_sync=clock_sync)
         with (
             closing(WarmSql(path, memory_limit=None, seconds=MOST_SECONDS)) as sql,
-            serving(path, sql, database, place="msgflow watch", port=port) as address,
+            serving(path, sql, port=port, following=database, place="msgflow watch") as address,
         ):
             print_status(address)
             yield database

@@ -343,53 +343,49 @@ def listen(port: int | None) -> socket.socket:
 
 
 @contextmanager
-def serving(path: Path, sql: Sql, following: Following, *, place: str, port: int) -> Iterator[str]:
-    """Yield the address, with the token, of a database that moves on: a thread serves its pages."""
-    with running(
-        path, sql, port=port, memory_limit=None, following=following, place=place
-    ) as (server, listener, address):  # fmt: skip
-        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
-        thread.start()
-        try:
-            yield address
-        finally:
-            server.should_exit = True
-            thread.join()
-
-
-@contextmanager
-def running(
+def serving(
     path: Path,
     sql: Sql,
     *,
     port: int | None,
-    memory_limit: str | None,
+    memory_limit: str | None = None,
     following: Following | None = None,
     place: str | None = None,
-) -> Iterator[tuple[uvicorn.Server, socket.socket, str]]:
-    """Prepare a server of the pages of a database; yield it, with its socket and address.
+) -> Iterator[str]:
+    """Serve the pages of a database; yield their address, with the token.
 
-    `port` is as for `listen`. The address has the token. Without `memory_limit`, DuckDB takes a
-    quarter of the machine's memory, at least 500 MB and at most 4 GB.
+    `port` is as for `listen`. Without `memory_limit`, DuckDB takes a quarter of the machine's
+    memory, at least 500 MB and at most 4 GB. The token is that of `place`, by default of the path.
     """
     place = place or str(path.resolve())
     with (
         closing(SharedDatabase(path, memory_limit)) as shared,
-        listening(place, port, lambda token: application(shared, token, sql, following)) as server,
+        serving_application(
+            place, port, lambda token: application(shared, token, sql, following)
+        ) as address,
     ):
-        yield server
+        yield address
 
 
 @contextmanager
-def listening(
+def serving_application(
     place: str, port: int | None, make: Callable[[str], ASGIApp]
-) -> Iterator[tuple[uvicorn.Server, socket.socket, str]]:
-    """Prepare a server of the application that `make` returns for the token of a place."""
-    listener = listen(port)
-    token = kept_token(place)
-    address = f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
-    with listener:
-        yield _server(make(token)), listener, address
+) -> Iterator[str]:
+    """Serve, in a thread, the application that `make` returns for the token of a place.
+
+    Yields the address, with the token.
+    """
+    with listen(port) as listener:
+        token = kept_token(place)
+        server = _server(make(token))
+        # In the main thread, Ctrl-C would end it halfway before it looks for signals itself.
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+        thread.start()
+        try:
+            yield f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
+        finally:
+            server.should_exit = True
+            thread.join()
 
 
 def serve_text(address: str, port: int, make: Callable[[], bytes], media_type: str) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import http.client
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -15,7 +14,7 @@ from urllib.parse import urlsplit
 import duckdb
 
 from msgflow.cli.sql_process import WarmSql
-from msgflow.view.server import cookie_of, running
+from msgflow.view.server import cookie_of, serving
 
 _UNITS = ((10**9, "s"), (10**6, "ms"), (10**3, "µs"), (1, "ns"))
 
@@ -25,12 +24,8 @@ class Served:
 
     def __init__(self, path: Path, seconds: float = 30) -> None:
         self._sql = WarmSql(path, memory_limit="1GB", seconds=seconds)
-        self._running = running(path, self._sql, port=0, memory_limit=None)
-        self.server, listener, self.address = self._running.__enter__()
-        self._thread = threading.Thread(
-            target=lambda: self.server.run(sockets=[listener]), daemon=True
-        )
-        self._thread.start()
+        self._serving = serving(path, self._sql, port=0)
+        self.address = self._serving.__enter__()
         self.port = urlsplit(self.address).port
         self.token = self.address.partition("token=")[2]
 
@@ -54,10 +49,7 @@ class Served:
         return page.partition('data-generation="')[2].partition('"')[0]
 
     def close(self) -> None:
-        self.server.should_exit = True
-        self._thread.join(20)
-        assert not self._thread.is_alive(), "the server does not end"
-        self._running.__exit__(None, None, None)
+        self._serving.__exit__(None, None, None)
         self._sql.close()
 
 

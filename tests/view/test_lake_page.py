@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -19,7 +18,7 @@ from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_page import lake_page, write_lake_page
 from msgflow.fleet.lake_query import fleet_query
 from msgflow.fleet.part import write_part
-from msgflow.view.server import listening, single_application
+from msgflow.view.server import serving_application, single_application
 
 _DAY = 86_400 * 10**9
 _SLOW = 9
@@ -135,26 +134,11 @@ def test_the_server_shows_the_page_anew(lake: Lake, page: Page) -> None:
         made.append(lake_page(lake, where="software_version = '1.1'").content)
         return made[-1]
 
-    for address, _ in served(make):
+    with serving_application("lake", 0, lambda token: single_application(make, token)) as address:
         page.open(address)
         assert "5 of 10 runs" in page.page.locator(".said").inner_text()
         page.open(address)
         assert len(made) == 2
-
-
-def served(make: object) -> Iterator[tuple[str, None]]:
-    with listening("lake", 0, lambda token: single_application(make, token)) as (  # type: ignore[arg-type]
-        server,
-        listener,
-        address,
-    ):
-        thread = threading.Thread(target=lambda: server.run(sockets=[listener]), daemon=True)
-        thread.start()
-        try:
-            yield address, None
-        finally:
-            server.should_exit = True
-            thread.join(20)
 
 
 @pytest.mark.thorough

@@ -30,7 +30,7 @@ from msgflow.view import pages
 from msgflow.view.connection import timed
 from msgflow.view.page_query import Question
 from msgflow.view.pages import Pages
-from msgflow.view.server import is_local, listen, running
+from msgflow.view.server import is_local, listen, serving
 from msgflow.view.shared_database import Ahead, Turns
 
 Serve = Callable[[Path], Served]
@@ -295,7 +295,7 @@ def test_a_port_in_use_is_said(demo: Path, tmp_path: Path) -> None:
         port = taken.getsockname()[1]
         sql = WarmSql(path, memory_limit=None, seconds=1)
         said = pytest.raises(UsageError, match="cannot listen on the port")
-        with said, running(path, sql, port=port, memory_limit=None):
+        with said, serving(path, sql, port=port):
             pass
     with listen(None) as first, listen(None) as second:
         assert first.getsockname() != second.getsockname()
