@@ -333,20 +333,20 @@ def _into_flow(
 def with_functions(
     connection: duckdb.DuckDBPyConnection, found: Explanation, times: Slice
 ) -> Explanation:
-    """Add a sentence with the three functions, where functions were sampled."""
-    parts = found.nodes.table.to_pylist()
-    slowest = next((row for row in parts if row["part"] == "callback"), None)
+    """Add a sentence: the callback that computes most, and three functions, where samples are."""
+    callbacks = [[row["node"], row["what"]] for row in found.nodes.table.to_pylist()]
     run_id = found.run.run_id
-    if slowest is None or not connection.execute(_SAMPLED, [run_id]).fetchall():
+    if not callbacks or not connection.execute(_SAMPLED, [run_id]).fetchall():
         return found
-    asked = {"run_id": run_id, "node": slowest["node"], "callback": slowest["what"]}
+    asked = {"run_id": run_id, "callbacks": callbacks}
     asked |= replace(times, start=found.start).window([found.run]).bindings
     rows = internal_sql().run(connection, "callback_function", asked).fetchall()
     if not rows:
         return found
-    shares = ", ".join(f"{function} {100 * share:.0f} %" for function, share, _ in rows)
-    said = f"CPU time of {slowest['node']} {slowest['what']}: {shares} (of {rows[0][2]:,} samples)"
-    step = ["query", "functions", "--node", slowest["node"], "--callback", slowest["what"]]
+    node, callback, *_, samples = rows[0]
+    shares = ", ".join(f"{function} {100 * share:.0f} %" for *_, function, share, _ in rows)
+    said = f"CPU time of {node} {callback}: {shares} (of {samples:,} samples)"
+    step = ["query", "functions", "--node", node, "--callback", callback]
     if times.start is None and found.start is not None:
         step += ["--start", str(found.start)]
     return replace(found, notes=(*found.notes, said), steps=(*found.steps, tuple(step)))

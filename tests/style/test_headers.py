@@ -39,6 +39,7 @@ TABLES = {
     " end_ns AS to_ns FROM main.callback_instance)",
     "parts": "main.end_to_end_part([1])",
     "of_samples": "(SELECT 1::BIGINT AS group_id, stack_id, cpu_ns FROM main.stack_sample)",
+    "waited": "main.executor_wait_explained([1])",
     "vertices": "(SELECT 8::BIGINT AS key, 'take' AS kind, 1::BIGINT AS id, 0 AS depth)",
 }
 # What many statements take; see `msgflow.sql.header`.

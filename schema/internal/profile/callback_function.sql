@@ -1,17 +1,30 @@
--- description: The three functions in which a callback was most of its CPU time.
+-- description: The callback, of some, that samples found on a CPU most often, and the three
+--     functions in which it was most of that time.
 -- grain: one row per function
--- param: node VARCHAR  Its node
--- param: callback VARCHAR  What triggers it
-WITH sample AS (
-    SELECT 1 AS group_id, s.stack_id, s.cpu_ns
+-- param: callbacks VARCHAR[][]  Node of each, and what triggers it
+WITH sampled AS (
+    SELECT l.node, l.label AS callback, s.stack_id, s.cpu_ns
     FROM main.stack_sample AS s
     JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-    WHERE s.run_id = $run_id AND l.node = $node AND l.label = $callback
+    WHERE s.run_id = $run_id AND list_contains($callbacks, [l.node, l.label])
         AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
+),
+longest AS (
+    SELECT node, callback, count(*) AS all_samples
+    FROM sampled
+    GROUP BY node, callback
+    ORDER BY all_samples DESC, node, callback
+    LIMIT 1
+),
+sample AS (
+    SELECT 1 AS group_id, s.stack_id, s.cpu_ns
+    FROM sampled AS s
+    JOIN longest AS l ON s.node = l.node AND s.callback = l.callback
 )
-SELECT f.function, t.self_share, (SELECT count(*) FROM sample) AS all_samples
+SELECT l.node, l.callback, f.function, t.self_share, l.all_samples
 FROM main.function_time('sample') AS t
+CROSS JOIN longest AS l
 JOIN main.stack_frame AS f ON t.stack_frame_id = f.stack_frame_id
 WHERE t.self_samples > 0
 ORDER BY t.self_samples DESC, f.function, f.file
