@@ -18,7 +18,7 @@ from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
 from msgflow.run.choice import choose_runs
 from msgflow.text.values import count, format_cell
-from msgflow.text.wrapping import wrap
+from msgflow.text.wrapping import hanging, wrap
 
 if TYPE_CHECKING:
     from msgflow.db.finding import Finding
@@ -128,6 +128,4 @@ def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterato
             ("   cause: ", first.cause),
             ("   cure:  ", first.cure),
         ):
-            head, *more = wrap(text, width - len(label))
-            yield label + head
-            yield from (" " * len(label) + line for line in more)
+            yield from hanging(label, text, width)
