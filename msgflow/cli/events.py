@@ -10,7 +10,7 @@ import typer
 
 from msgflow.cli.operation import operation
 from msgflow.cli.options import Reader
-from msgflow.cli.output import data_stream, print_note, print_result, print_status, terminal
+from msgflow.cli.output import data_stream, print_note, print_result, print_status
 from msgflow.errors import UsageError
 from msgflow.events.formats import TABLES, EventFormat, format_of, is_directory
 from msgflow.export.formats import Format
@@ -85,8 +85,7 @@ def _write(selection: Selection, form: EventFormat, output: Path | None) -> None
     if output is None:
         if form is EventFormat.PARQUET and sys.stdout.isatty():
             raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
-        stream = data_stream()
-        if not write_events(selection, form, terminal(stream) if stream.isatty() else stream):
+        if not write_events(selection, form, data_stream()):
             print_note("no events")
         return
     with ingest_progress(quiet=False) as progress:

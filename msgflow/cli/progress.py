@@ -81,12 +81,8 @@ def fleet_progress(quiet: bool) -> Iterator[Callable[[FleetProgress], None] | No
         task = bar.add_task("opening", total=None)
 
         def show(progress: FleetProgress) -> None:
-            bar.update(
-                task,
-                description=_fleet_line(progress),
-                total=progress.total,
-                completed=progress.done,
-            )
+            line = _fleet_line(progress)
+            bar.update(task, description=line, total=progress.total, completed=progress.done)
 
         yield show
 
