@@ -65,11 +65,10 @@ def command(
         damages = list(opened.damages)
         copies = opened.duplicate_packet_count + sum(opened.repeated_packet_counts.values())
     for damage in damages[:_DAMAGES_SHOWN]:
-        print_note(
-            f"{damage.message} — {damage.file}, packet {damage.position}, byte {damage.offset}"
-        )
+        place = f"packet {damage.position}, byte {damage.offset}"
+        print_note(f"{damage.message} — {damage.file}, {place}")
     if len(damages) > _DAMAGES_SHOWN:
-        print_note(f"{counted(len(damages) - _DAMAGES_SHOWN, 'further damage')}")
+        print_note(counted(len(damages) - _DAMAGES_SHOWN, "further damage"))
     if copies:
         print_note(f"{counted(copies, 'packet')} left out: the traces hold the same once more")
     if lost:

@@ -11,7 +11,7 @@ import typer
 from msgflow.cli.compare import FailOn, OnlyDifferent, print_comparison
 from msgflow.cli.operation import operation
 from msgflow.cli.options import Reader, bytes_of, one_text
-from msgflow.cli.output import Shown, print_note, print_queries, print_result, print_status
+from msgflow.cli.output import Shown, print_list, print_note, print_result, print_status
 from msgflow.cli.sql import DEFAULT_LIMIT, FileOption, sql_of
 from msgflow.errors import ExitCode, UsageError
 from msgflow.result.layout import MOST_ROWS
@@ -191,7 +191,8 @@ def query(
     from msgflow.query.selection import values_of
 
     if name is None:
-        print_queries(map(header_of, names()))
+        listed = [(each.words, each.title) for each in map(header_of, names())]
+        print_list(listed, ("query", "title"))
         return
     words = {"case": case, "measure": measure, "section": section}
     own = {word: value for word, value in words.items() if value is not None}

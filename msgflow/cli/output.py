@@ -8,6 +8,7 @@ import shlex
 import shutil
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypedDict, cast
 
@@ -20,12 +21,11 @@ from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.result.layout import MOST_ROWS, lay_out, screen_width
 from msgflow.result.screen import screen_lines
 from msgflow.text.values import count, printable
-from msgflow.text.wrapping import wrap
+from msgflow.text.wrapping import hanging, wrap
 
 if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
-    from msgflow.sql.header import Header
 
 
 # The narrowest column in which text wraps beside a name.
@@ -171,19 +171,14 @@ def print_lines(lines: Iterable[str]) -> None:
     stream.flush()
 
 
-def print_queries(queries: Iterable[Header]) -> None:
-    """Write names of queries and their titles side by side; a terminal wraps the titles."""
-    every = [("query", "title"), *((query.words, query.title) for query in queries)]
+def print_list(rows: Sequence[tuple[str, str]], titles: tuple[str, str] | None = None) -> None:
+    """Write names and their descriptions side by side; a terminal wraps the descriptions."""
+    every = [*([titles] if titles else []), *rows]
     width = max(cell_len(name) for name, _ in every)
-    room = max(_LEAST_ROOM, screen_width() - width - 2) if is_screen() else None
-    wrapped = [(name, [text] if room is None else wrap(text, room)) for name, text in every]
-    lines = [
-        f"{name if place == 0 else '':{width}}  {line}"
-        for name, texts in wrapped
-        for place, line in enumerate(texts)
-    ]
-    longest = max(cell_len(line) for _, texts in wrapped for line in texts)
-    lines.insert(len(wrapped[0][1]), "─" * (width + 2 + longest))
+    room = max(width + 2 + _LEAST_ROOM, screen_width()) if is_screen() else sys.maxsize
+    lines = [line for name, text in every for line in hanging(f"{name:{width}}  ", text, room)]
+    if titles:
+        lines.insert(1, "─" * max(map(cell_len, lines)))
     print_lines(lines)
 
 
@@ -228,12 +223,10 @@ class _Terminal:
 
 def _width_of_stderr() -> int:
     """Return the width of the terminal of stderr; stdout may go elsewhere."""
-    if os.environ.get("COLUMNS", "").isdigit():
-        return screen_width()
-    try:
-        return os.get_terminal_size(sys.stderr.fileno()).columns or screen_width()
-    except (OSError, ValueError):
-        return screen_width()
+    with suppress(OSError, ValueError):
+        if not os.environ.get("COLUMNS", "").isdigit():
+            return os.get_terminal_size(sys.stderr.fileno()).columns or screen_width()
+    return screen_width()
 
 
 def _fitting(text: str, indent: str, used: int = 0) -> list[str]:

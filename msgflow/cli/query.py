@@ -7,7 +7,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from msgflow.cli.output import print_queries
+from msgflow.cli.output import print_list
 from msgflow.cli.query_command import build_command, chosen_by, print_options_of_every_query
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import COMMANDS, load_queries, load_query, query_names
@@ -48,4 +48,5 @@ app = typer.Typer(cls=_QueryGroup, subcommand_metavar="[NAME] [OPTIONS]")
 def group(context: typer.Context) -> None:
     """List the queries, unless one is named."""
     if context.invoked_subcommand is None:
-        print_queries(each for each in load_queries() if not each.is_command)
+        listed = [(each.words, each.title) for each in load_queries() if not each.is_command]
+        print_list(listed, ("query", "title"))

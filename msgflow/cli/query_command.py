@@ -138,11 +138,10 @@ def build_command(
                 "tables for people have times with their units — --times",
                 "--format csv, json, jsonl or parquet, or a file with such a suffix",
             )
-        asked = {word: given[word] for word in _DEFAULTS if word in given}
         said = {
-            word: one_text(value)
-            for word, value in asked.items()
-            if value not in (_DEFAULTS[word], [])
+            word: one_text(given[word])
+            for word, default in _DEFAULTS.items()
+            if given.get(word, default) not in (default, [])
         }
         with Database(given["database"], memory_limit=given["memory_limit"]) as database:
             result = database.query(header.name, **said, **own)

@@ -50,13 +50,13 @@ def command(
     from msgflow.view.sql_page import MOST_SECONDS
 
     with ExitStack() as stack:
-        if lake is None:
+        if lake is not None:
+            server = _serving_lake(lake, where, port)
+        else:
             require_no_where(where)
             sql = WarmSql(database, memory_limit=memory_limit, seconds=MOST_SECONDS)
             stack.callback(sql.close)
             server = serving(database, sql, port=port, memory_limit=memory_limit)
-        else:
-            server = _serving_lake(lake, where, port)
         interrupts = stack.enter_context(noted_interrupts())
         address = stack.enter_context(server)
         print_status(address)

@@ -192,7 +192,7 @@ def _heading(report: WindowReport) -> Text:
     if report.lag_s is not None:
         text.append(f"   lag {report.lag_s:.1f} s", style="not bold")
     if report.verdicts:
-        text.append(f"   targets: {verdict_words(report)}", style="not bold")
+        text.append(f"   targets: {_verdict_words(report)}", style="not bold")
     lost = report.discarded_events
     said = f"{count(lost, 'event')} lost by the tracer"
     text.append(f"   {said}", style="red" if lost else "not bold dim")
@@ -298,12 +298,11 @@ def window_line(report: WindowReport) -> str:
     if report.late_events:
         words.append(f"{count(report.late_events, 'event')} came late")
     if report.verdicts:
-        words.append(f"targets: {verdict_words(report)}")
+        words.append(f"targets: {_verdict_words(report)}")
     if report.lag_s is not None:
         words.append(f"lag {report.lag_s:.1f} s")
     return f"{start} to {end}: {', '.join(words)}"
 
 
-def verdict_words(report: WindowReport) -> str:
-    """Return how many verdicts on targets there are of each kind."""
+def _verdict_words(report: WindowReport) -> str:
     return ", ".join(f"{number} {verdict}" for verdict, number in sorted(report.verdicts.items()))
