@@ -729,9 +729,8 @@ class Database:
         skipped = self._ask(warm_up, one) if start is None else 0.0
         start = f"{skipped:g}s" if skipped else start
         ask = partial(self.query, run=one.run_id, start=start)
-        return suggest_targets(
-            one, {name: ask(name).to_arrow() for name in QUERIES}, margin, skipped
-        )
+        results = {name: ask(name).to_arrow() for name in QUERIES}
+        return suggest_targets(one, results, margin, skipped)
 
     def report(
         self,
