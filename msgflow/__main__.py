@@ -13,14 +13,13 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from msgflow.cli.signals import HANDLER
 
-    HANDLER.run(_run)
+    def run() -> None:
+        # Its imports take long enough for a signal to come.
+        from msgflow.cli.app import app
 
+        app()
 
-def _run() -> None:
-    # Its imports take long enough for a signal to come.
-    from msgflow.cli.app import app
-
-    app()
+    HANDLER.run(run)
 
 
 if __name__ == "__main__":

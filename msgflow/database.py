@@ -195,16 +195,10 @@ class Database:
 
         place = Path(directory).absolute()
         recorded = record(
-            place,
-            name=place.name,
-            channel=Channel(),
-            program=program,
-            seconds=seconds,
-            kernel=kernel,
-            profile=None if profile is None else read_rate(profile),
-            note=note,
+            place, name=place.name, channel=Channel(), program=program, seconds=seconds,
+            kernel=kernel, profile=None if profile is None else read_rate(profile), note=note,
             show=lambda status: None,
-        )
+        )  # fmt: skip
         if recorded.exit_code:
             note(f"{program[0]} ended with exit code {recorded.exit_code}")
         return self.ingest(place)
@@ -254,19 +248,12 @@ class Database:
         return ingest(
             [paths] if isinstance(paths, str | Path) else list(paths),
             self.path,
-            name=name,
-            replace=replace,
-            hosts=dict(hosts) if hosts else None,
+            name=name, replace=replace, hosts=dict(hosts) if hosts else None,
             keep_staging=Path(keep_staging) if keep_staging is not None else None,
             links=Path(links) if links is not None else None,
-            clock_sync=clock_sync,
-            reader=reader,
-            strict=strict,
-            ignore=ignore,
-            events=events,
-            memory_limit=self._memory_limit,
-            progress=progress,
-        )
+            clock_sync=clock_sync, reader=reader, strict=strict, ignore=ignore, events=events,
+            memory_limit=self._memory_limit, progress=progress,
+        )  # fmt: skip
 
     def apply_links(
         self, file: str | Path, *, run: str | int | None = None, content: str | None = None
@@ -303,16 +290,11 @@ class Database:
         found = self.query("links-suggested", run=run)
 
         def of_file(name: str) -> list[dict[str, Any]]:
-            chosen = ({"run_id": one.run_id} for one in found.runs)
-            asked = (internal_sql().rows(self.connection, name, each) for each in chosen)
-            return [row for rows in asked for row in rows]
+            asked = partial(internal_sql().rows, self.connection, name)
+            return [row for one in found.runs for row in asked({"run_id": one.run_id})]
 
-        return LinkSuggestions(
-            found.runs,
-            found.to_arrow().to_pylist(),
-            of_file("link_of_file"),
-            of_file("topic_of_file"),
-        )
+        rows = found.to_arrow().to_pylist()
+        return LinkSuggestions(found.runs, rows, of_file("link_of_file"), of_file("topic_of_file"))
 
     def apply_clocks(
         self, clock_sync: str | Path, *, run: str | int | None = None
@@ -457,12 +439,11 @@ class Database:
 
         header = choose_query(name, parameters, public_names)
         part = Slice(run, start, end)
+        own = {param.name for param in header.params}
         if path is not None:
             if via or without or {"from", "from_", "to", "to_"} & set(parameters):
                 raise _path_and_others(path)
-            takes = {param.name for param in header.params}
-            if columns_of(header, PATH):
-                takes |= {"via", "without"}
+            takes = own | ({"via", "without"} if columns_of(header, PATH) else set())
             words = self._ask(_words_of_path, path, Path(paths), part) if "from" in takes else {}
             if not words or not words.keys() <= takes:
                 raise UsageError(f"{header.words} has no paths — --path {path}", "leave it out")
@@ -473,10 +454,7 @@ class Database:
             "without": without, "where": where, "sort": sort, "limit": limit, "slowest": slowest,
         }  # fmt: skip
         # A query applies its own parameters itself.
-        own = {param.name for param in header.params} & {
-            word for word, value in selection.items() if value is not None
-        }
-        for word in own:
+        for word in own & {word for word, value in selection.items() if value is not None}:
             parameters[word] = selection.pop(word)  # type: ignore[assignment]
 
         def ask(connection: duckdb.DuckDBPyConnection) -> QueryResult:
@@ -611,14 +589,9 @@ class Database:
         from msgflow.view.flow_page import write_flow_page
 
         return self._ask(
-            write_flow_page,
-            Path(path),
-            flow.run,
-            *flow.start_key,
-            direction=flow.direction,
-            depth=flow.depth,
-            limit=flow.limit,
-        )
+            write_flow_page, Path(path), flow.run, *flow.start_key, direction=flow.direction,
+            depth=flow.depth, limit=flow.limit,
+        )  # fmt: skip
 
     def graph(self, *, internal: bool = False, **part: Unpack[SliceWords]) -> Graph:
         """Return the graph of nodes, topics, services and actions, for DOT, Mermaid or JSON.
@@ -690,25 +663,11 @@ class Database:
         from msgflow.query.compare import compare
 
         return self._ask(
-            compare,
-            run_a,
-            run_b,
-            run=run,
-            window=window,
-            what=what,
-            from_=from_,
-            to=to,
-            case=case,
-            explain=explain,
-            at_least=at_least,
-            skip_first=skip_first,
-            confidence=confidence,
-            resamples=resamples,
-            seed=seed,
-            internal=internal,
-            max_depth=max_depth,
+            compare, run_a, run_b, run=run, window=window, what=what, from_=from_, to=to, case=case,
+            explain=explain, at_least=at_least, skip_first=skip_first, confidence=confidence,
+            resamples=resamples, seed=seed, internal=internal, max_depth=max_depth,
             max_paths=max_paths,
-        )
+        )  # fmt: skip
 
     def verify(
         self,
@@ -769,9 +728,8 @@ class Database:
         one = self._ask(Slice(run).one_run, "a file of requirements")
         skipped = self._ask(warm_up, one) if start is None else 0.0
         start = f"{skipped:g}s" if skipped else start
-        results = {
-            name: self.query(name, run=one.run_id, start=start).to_arrow() for name in QUERIES
-        }
+        ask = partial(self.query, run=one.run_id, start=start)
+        results = {name: ask(name).to_arrow() for name in QUERIES}
         return suggest_targets(one, results, margin, skipped)
 
     def report(
@@ -804,14 +762,9 @@ class Database:
 
         found = None if targets is None else self.verify(targets, paths=paths, **part)
         return self._ask(
-            write_report,
-            Path(output),
-            Slice(**part),
-            compare=compare,
-            verification=found,
-            through=through,
-            max_size=max_size,
-        )
+            write_report, Path(output), Slice(**part), compare=compare, verification=found,
+            through=through, max_size=max_size,
+        )  # fmt: skip
 
     def sql(self, text: str, *, limit: int | None = DEFAULT_LIMIT) -> QueryResult:
         """Run SQL that only reads, without access to other files.
@@ -1107,7 +1060,6 @@ class Database:
 def _words_of_path(
     connection: duckdb.DuckDBPyConnection, name: str, file: Path, part: Slice
 ) -> dict[str, list[str]]:
-    """Return the arguments of `query` that a path stands for."""
     from msgflow.paths.paths_file import read_paths
 
     runs = part.runs(connection)
@@ -1248,10 +1200,8 @@ def _start(
     if starts and at is not None:
         raise UsageError("an identity has a time already", "leave out --at, or name a topic")
     if starts and run is not None:
-        found, asked = (
-            require_start(connection, starts[0]),
-            Slice(run).one_run(connection, "a flow"),
-        )
+        found = require_start(connection, starts[0])
+        asked = Slice(run).one_run(connection, "a flow")
         if found != asked:
             raise UsageError(
                 f"{starts[0].kind} {starts[0].id} is not of run {asked.title}",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from importlib.metadata import EntryPoint, EntryPoints
+from importlib.metadata import entry_points
 from itertools import takewhile
 from typing import Annotated, Any
 
@@ -62,6 +62,7 @@ if the words behind the name ask that.
 """
 _MORE = frozenset(("bag", "db", "events", "fleet", "mcp", "simulate"))
 """What users of one robot rarely need: it has a panel of its own in the help."""
+_ADDED = "msgflow.commands"
 _SIMULATOR = "in a checkout of msgflow: uv tool install . --with ./simulator"
 
 
@@ -78,7 +79,7 @@ class RootGroup(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands, those of other distributions last."""
-        for point in _added():
+        for point in entry_points(group=_ADDED):
             summary = point.dist.metadata["Summary"] if point.dist else None
             self.commands.setdefault(point.name, _listed(point.name, summary))
         return super().list_commands(ctx)
@@ -137,14 +138,8 @@ def _listed(name: str, summary: str | None) -> TyperCommand:
     return TyperCommand(name, help=summary, rich_help_panel="More" if name in _MORE else None)
 
 
-def _added() -> EntryPoints:
-    from importlib.metadata import entry_points
-
-    return entry_points(group="msgflow.commands")
-
-
 def _imported(name: str, words: list[str]) -> Any:
-    module = import_module(f"msgflow.cli.{name}") if name in COMMANDS else _loaded(_added()[name])
+    module = import_module(f"msgflow.cli.{name}") if name in COMMANDS else _loaded(name)
     if (asked := getattr(module, "asked", None)) and (found := asked(words)):
         return found
     around = typer.Typer(add_completion=False)
@@ -156,13 +151,14 @@ def _imported(name: str, words: list[str]) -> Any:
     return typer.main.get_group(around).commands[name]
 
 
-def _loaded(point: EntryPoint) -> Any:
+def _loaded(name: str) -> Any:
+    point = entry_points(group=_ADDED)[name]
     try:
         return point.load()
     except ImportError as error:
         owner = point.dist.name if point.dist else point.value
         raise UsageError(
-            f"the command {point.name} cannot be imported: {error} — {owner}",
+            f"the command {name} cannot be imported: {error} — {owner}",
             f"pip install --upgrade {owner}",
         ) from error
 

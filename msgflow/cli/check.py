@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from itertools import groupby
@@ -18,7 +19,7 @@ from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
 from msgflow.run.choice import choose_runs
 from msgflow.text.values import count, format_cell
-from msgflow.text.wrapping import wrap
+from msgflow.text.wrapping import hanging, wrap
 
 if TYPE_CHECKING:
     from msgflow.db.finding import Finding
@@ -102,23 +103,21 @@ def _numbered(findings: Sequence[Finding]) -> Iterator[tuple[int, Finding]]:
 
 
 def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterator[str]:
-    def fitting(text: str, room: int) -> list[str]:
-        # In a pipe what people search for stays in one line.
-        return wrap(text, room) if is_screen() else [text]
-
     width = min(_WIDTH, shutil.get_terminal_size((_WIDTH, 24)).columns)
+    # In a pipe what people search for stays in one line.
+    room = width if is_screen() else sys.maxsize
     for number, group in groupby(_numbered(findings), key=lambda item: item[0]):
         places = [finding for _, finding in group]
         first = places[0]
         if number > 1:
             yield ""
-        head, *more = fitting(f"{first.severity}: {first.title} ({first.name})", width - 4)
+        head, *more = wrap(f"{first.severity}: {first.title} ({first.name})", room - 4)
         yield f"{number}. {head}"
         yield from (f"   {line}" for line in more)
         for finding in places[:PLACES_SHOWN]:
             run = f"run {run_labels[finding.run_id]}: " if run_labels else ""
             text = f"{format_cell(run + finding.subject)} — {format_cell(finding.detail)}"
-            first_line, *more = fitting(text, width - 5)
+            first_line, *more = wrap(text, room - 5)
             yield f"   {first_line}"
             yield from (f"     {line}" for line in more)
         if len(places) > PLACES_SHOWN:
@@ -128,6 +127,4 @@ def _text(findings: Sequence[Finding], run_labels: Mapping[int, str]) -> Iterato
             ("   cause: ", first.cause),
             ("   cure:  ", first.cure),
         ):
-            head, *more = wrap(text, width - len(label))
-            yield label + head
-            yield from (" " * len(label) + line for line in more)
+            yield from hanging(label, text, width)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 
 class _ClocksGroup(AskingGroup):
-    query = "clocks"
     default = "show"
 
     def write(self, result: QueryResult, form: Any, given: dict[str, Any]) -> None:
@@ -43,10 +43,11 @@ def apply(database: Database, how: str, *, run: str | None = None) -> None:
     runs = database.apply_clocks(how, run=run)
     print_runs(runs)
     for one in runs:
-        clocks = database.query("clocks", run=one.run_id).to_arrow().to_pylist()
+        ask = partial(database.query, run=one.run_id)
+        clocks = ask("clocks").to_arrow().to_pylist()
         corrected = [clock for clock in clocks if clock["method"] not in ("none", "reference")]
         print_status(f"{len(corrected)} of {len(clocks)} clocks corrected: msgflow clocks")
-        pairs = database.query("clocks-pair", run=one.run_id).to_arrow().to_pylist()
+        pairs = ask("clocks-pair").to_arrow().to_pylist()
         if how == "messages" and pairs:
             messages = sum(pair["message_count"] for pair in pairs)
             packets = sum(pair["packet_count"] for pair in pairs)
@@ -54,8 +55,6 @@ def apply(database: Database, how: str, *, run: str | None = None) -> None:
                 f"by {messages:,} messages and {packets:,} network packets:"
                 " msgflow clocks --by pair"
             )
-        findings = database.query(
-            "info-findings", run=one.run_id, where="starts_with(name, 'clock_')"
-        )
+        findings = ask("info-findings", where="starts_with(name, 'clock_')")
         for finding in findings.to_arrow().to_pylist():
             print_note(f"{finding['name']}: {finding['detail']}")

@@ -66,7 +66,13 @@ def print_exception(error: Exception) -> ExitCode:
             "raise its limits (ulimit -v, ulimit -u, those of its container), or read less",
         )
         return ExitCode.FAILED
-    return _unexpected(error)
+    summary = (str(error).strip().splitlines() or [""])[0]
+    hint = "this is a mistake of msgflow; MSGFLOW_DEBUG=1 in the environment shows where"
+    if os.environ.get("MSGFLOW_DEBUG") == "1":
+        traceback.print_exception(error)
+        hint = f"this is a mistake of msgflow {__version__}; report it with the lines above"
+    print_error(f"unexpected {type(error).__name__}: {summary}", hint)
+    return ExitCode.FAILED
 
 
 def _usage(error: typer.TyperException) -> tuple[str, str | None]:
@@ -83,14 +89,3 @@ def _usage(error: typer.TyperException) -> tuple[str, str | None]:
         if word in words and context is not None and context.command_path.endswith(command):
             hint = instead
     return message[:1].lower() + message[1:].rstrip("."), hint
-
-
-def _unexpected(error: Exception) -> ExitCode:
-    summary = (str(error).strip().splitlines() or [""])[0]
-    if os.environ.get("MSGFLOW_DEBUG") == "1":
-        traceback.print_exception(error)
-        hint = f"this is a mistake of msgflow {__version__}; report it with the lines above"
-    else:
-        hint = "this is a mistake of msgflow; MSGFLOW_DEBUG=1 in the environment shows where"
-    print_error(f"unexpected {type(error).__name__}: {summary}", hint)
-    return ExitCode.FAILED

@@ -10,7 +10,7 @@ import typer
 
 from msgflow.cli.operation import operation
 from msgflow.cli.options import Reader
-from msgflow.cli.output import data_stream, print_note, print_result, print_status, terminal
+from msgflow.cli.output import data_stream, print_note, print_result, print_status
 from msgflow.errors import UsageError
 from msgflow.events.formats import TABLES, EventFormat, format_of, is_directory
 from msgflow.export.formats import Format
@@ -65,11 +65,10 @@ def command(
         damages = list(opened.damages)
         copies = opened.duplicate_packet_count + sum(opened.repeated_packet_counts.values())
     for damage in damages[:_DAMAGES_SHOWN]:
-        print_note(
-            f"{damage.message} — {damage.file}, packet {damage.position}, byte {damage.offset}"
-        )
+        place = f"packet {damage.position}, byte {damage.offset}"
+        print_note(f"{damage.message} — {damage.file}, {place}")
     if len(damages) > _DAMAGES_SHOWN:
-        print_note(f"{counted(len(damages) - _DAMAGES_SHOWN, 'further damage')}")
+        print_note(counted(len(damages) - _DAMAGES_SHOWN, "further damage"))
     if copies:
         print_note(f"{counted(copies, 'packet')} left out: the traces hold the same once more")
     if lost:
@@ -85,8 +84,7 @@ def _write(selection: Selection, form: EventFormat, output: Path | None) -> None
     if output is None:
         if form is EventFormat.PARQUET and sys.stdout.isatty():
             raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
-        stream = data_stream()
-        if not write_events(selection, form, terminal(stream) if stream.isatty() else stream):
+        if not write_events(selection, form, data_stream()):
             print_note("no events")
         return
     with ingest_progress(quiet=False) as progress:

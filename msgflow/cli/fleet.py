@@ -88,23 +88,14 @@ def ingest(
     from msgflow.fleet.task import Options
 
     given: dict[str, Any] = {
-        "reader": reader,
-        "strict": strict,
-        "ignore": ignore or [],
-        "events": events or [],
+        "reader": reader, "strict": strict, "ignore": ignore or [], "events": events or [],
         "clock_sync": clock_sync,
-    }
+    }  # fmt: skip
     options = Options(
-        ingest=given,
-        views=views,
-        database=database,
-        replace=replace,
-        retry_failed=retry_failed,
-        tries=tries,
-        timeout=seconds,
-        memory=most,
+        ingest=given, views=views, database=database, replace=replace, retry_failed=retry_failed,
+        tries=tries, timeout=seconds, memory=most,
         scratch=None if scratch is None else str(scratch.absolute()),
-    )
+    )  # fmt: skip
     with fleet_progress(quiet) as progress:
         report = fleet_ingest(
             sources, lake, ray=ray, options=options, labels=labels, shard=part, progress=progress
@@ -200,7 +191,7 @@ def query(
     from msgflow.query.selection import values_of
 
     if name is None:
-        listed = [(header_of(each).words, header_of(each).title) for each in names()]
+        listed = [(each.words, each.title) for each in map(header_of, names())]
         print_list(listed, ("query", "title"))
         return
     words = {"case": case, "measure": measure, "section": section}
@@ -210,14 +201,10 @@ def query(
         "node": node, "topic": topic, "callback": callback, "host": host, "via": via,
         "without": without, "sort": sort, "limit": limit,
     }  # fmt: skip
+    given = {word: one_text(value) for word, value in selection.items()}
+    groups = values_of(one_text(group_by))
     result = fleet_query(
-        _opened(lake),
-        name,
-        where=where,
-        group_by=values_of(one_text(group_by)),
-        internal=internal,
-        selection={word: one_text(value) for word, value in selection.items()},
-        **own,
+        _opened(lake), name, where=where, group_by=groups, internal=internal, selection=given, **own
     )
     print_result(result, **shown, columns=columns, most_rows=limit or MOST_ROWS)
 
@@ -354,20 +341,15 @@ def compare(
     from msgflow.fleet.compare import compare as compared
 
     comparison = compared(
-        _opened(lake),
-        by,
-        base,
-        other,
-        where=where,
-        unit=unit,
-        case=case,
-        confidence=confidence,
+        _opened(lake), by, base, other, where=where, unit=unit, case=case, confidence=confidence,
         at_least=at_least,
-    )
+    )  # fmt: skip
     print_comparison(comparison, fail_on or [], only_different, **shown)
 
 
 def _labels(texts: list[str]) -> dict[str, str]:
+    from msgflow.db.runs import require_label
+
     labels: dict[str, str] = {}
     for text in texts:
         key, sign, value = text.partition("=")
@@ -375,11 +357,7 @@ def _labels(texts: list[str]) -> dict[str, str]:
             raise UsageError(f"a label is KEY=VALUE — {text}", "--label site=berlin")
         if labels.setdefault(key, value) != value:
             raise UsageError(f"a recording has one label of a key — {key}", "give it once")
-    if labels:
-        from msgflow.db.runs import require_label
-
-        for key, value in labels.items():
-            require_label(key, value)
+        require_label(key, value)
     return labels
 
 

@@ -150,9 +150,7 @@ def command(
             output,
         )
     for rank, row in enumerate(rows, start=1):
-        print_note(
-            f"slowest flow {rank}: {format_duration(row['latency_ns'])} to take {row['take_id']},"
-            f" {row['path']}"
-        )
+        took = format_duration(row["latency_ns"])
+        print_note(f"slowest flow {rank}: {took} to take {row['take_id']}, {row['path']}")
     for note in dict.fromkeys(note for flow in flows for note in flow.notes):
         print_note(note)

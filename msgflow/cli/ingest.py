@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 from msgflow.cli.check import PLACES_SHOWN
 from msgflow.cli.operation import operation
 from msgflow.cli.options import Reader
-from msgflow.cli.output import database_option, print_next, print_note, print_status
+from msgflow.cli.output import command_text, print_next, print_note, print_status
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.run.choice import require_run_name
@@ -64,6 +63,7 @@ def command(
     with noted_interrupts():
         from msgflow.cli.progress import ingest_progress
         from msgflow.database import Database
+        from msgflow.db.finding import next_command
         from msgflow.ingest.recordings import Recording, find_recordings
 
         if name is not None:
@@ -92,19 +92,10 @@ def command(
             reports = []
             for recording in recordings:
                 report = opened.ingest(
-                    recording.paths,
-                    name=name,
-                    replace=replace,
-                    hosts=recording.hosts,
-                    keep_staging=keep_staging,
-                    links=links,
-                    clock_sync=clock_sync,
-                    reader=reader,
-                    strict=strict,
-                    ignore=ignore or [],
-                    events=events or [],
-                    progress=progress,
-                )
+                    recording.paths, name=name, replace=replace, hosts=recording.hosts,
+                    keep_staging=keep_staging, links=links, clock_sync=clock_sync, reader=reader,
+                    strict=strict, ignore=ignore or [], events=events or [], progress=progress,
+                )  # fmt: skip
                 reports.append(report)
                 if not quiet:
                     _print_report(report, database)
@@ -112,7 +103,12 @@ def command(
                     print_note(warning)
             if not quiet:
                 _note_archives(traces, database)
-                _print_next(reports, database)
+                findings = [each for report in reports for each in report.findings]
+                words = next_command(findings).split()
+                # Of several runs, `why` explains one.
+                several = words if words[-1] == "check" else ["msgflow", "query", "e2e-latency"]
+                is_one = len(reports) == 1
+                print_next(words if is_one else several, database, None if is_one else "all")
 
 
 def _note_archives(traces: list[str], database: Path) -> None:
@@ -125,7 +121,7 @@ def _note_archives(traces: list[str], database: Path) -> None:
         words = ["msgflow", "ingest", *traces, *archives[:ARCHIVES_SHOWN], "--replace"]
         print_note(
             f"{count(len(archives), 'archive')} beside the traces {verb} not read; to read what is"
-            f" of the same recording: {shlex.join([*words, *database_option(database)])}"
+            f" of the same recording: {command_text(words, database)}"
         )
 
 
@@ -144,18 +140,6 @@ def _print_report(report: IngestReport, database: Path) -> None:
             print_note(f"{name} ({finding.count}): {place}{finding.detail}")
         if len(places) > PLACES_SHOWN:
             print_note(f"{name}: {len(places) - PLACES_SHOWN} more places: msgflow check")
-
-
-def _print_next(reports: list[IngestReport], database: Path) -> None:
-    from msgflow.db.finding import next_command
-
-    words = next_command([each for report in reports for each in report.findings]).split()
-    if len(reports) == 1:
-        print_next(words, database)
-    else:
-        # Of several runs, `why` explains one.
-        several = words if words[-1] == "check" else ["msgflow", "query", "e2e-latency"]
-        print_next(several, database, "all")
 
 
 def _hosts(texts: list[str]) -> dict[str, list[str]]:

@@ -17,11 +17,7 @@ if TYPE_CHECKING:
     from msgflow.links.annotations import AppliedLinks
 
 
-class _LinksGroup(AskingGroup):
-    query = "links"
-
-
-app = typer.Typer(cls=_LinksGroup)
+app = typer.Typer(cls=AskingGroup)
 
 
 @app.command("apply")

@@ -106,7 +106,6 @@ def _said(given: Mapping[str, Any], asked: Iterable[Parameter]) -> dict[str, Any
 def _described(
     command: Command, parameters: Sequence[Parameter], *functions: Callable[..., Any]
 ) -> Command:
-    """Return a command with parameters, and with the help of functions."""
     set_parameters(command, parameters)
     command.__doc__ = "\n\n".join([*map(_help, functions), *_arguments(parameters)])
     return command

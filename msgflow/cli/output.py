@@ -8,6 +8,7 @@ import shlex
 import shutil
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypedDict, cast
 
@@ -20,7 +21,7 @@ from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.result.layout import MOST_ROWS, lay_out, screen_width
 from msgflow.result.screen import screen_lines
 from msgflow.text.values import count, printable
-from msgflow.text.wrapping import wrap
+from msgflow.text.wrapping import hanging, wrap
 
 if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
@@ -54,23 +55,20 @@ def print_status(text: str) -> None:
 
 def print_next(words: Sequence[str], database: Path, run: str | int | None = None) -> None:
     """Print a command that runs as it is printed."""
+    print_status(f"next: {command_text(words, database, run)}")
+
+
+def command_text(words: Sequence[str], database: Path, run: str | int | None = None) -> str:
+    """Return a command for the shell, with the run, and the database if it is not the default."""
     chosen = ["--run", str(run)] if run is not None else []
-    print_status(f"next: {shlex.join([*words, *chosen, *database_option(database)])}")
-
-
-def database_option(database: Path) -> list[str]:
-    """Return the words that name a database in a command; none for the default one."""
-    return ["--db", str(database)] if database != DEFAULT_DATABASE else []
-
-
-def is_asked() -> bool:
-    """Tell whether a user can answer: stdin and stderr are a terminal."""
-    return all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
+    named = ["--db", str(database)] if database != DEFAULT_DATABASE else []
+    return shlex.join([*words, *chosen, *named])
 
 
 def confirm(question: str) -> bool:
-    """Ask on the terminal whether to go on; no answer means no."""
-    return typer.confirm(printable(question, _LINES), err=True)
+    """Ask on the terminal whether to go on; no answer means no. A script is not asked."""
+    is_asked = all(each is not None and each.isatty() for each in (sys.stdin, sys.stderr))
+    return not is_asked or typer.confirm(printable(question, _LINES), err=True)
 
 
 class Shown(TypedDict, total=False):
@@ -103,15 +101,15 @@ def print_result(
         print_status(f"{count(len(result), 'row')} written to {output}")
     else:
         stdout = data_stream()
-        if form is Format.PARQUET and stdout.isatty():
-            raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
         on_terminal = stdout.isatty()
+        if form is Format.PARQUET and on_terminal:
+            raise UsageError("Parquet is not for a terminal", "name a file with -o FILE.parquet")
         is_brief = columns is None and result.header is not None and bool(result.header.brief)
         if form is Format.TABLE and not wide and (on_terminal or is_brief):
             # A pipe has room for all rows, and people read no more than so many columns.
             _print_for_screen(result, columns is not None, most_rows if on_terminal else None)
         else:
-            write_result(result, form, terminal(stdout) if on_terminal else stdout)
+            write_result(result, form, stdout)
     if output is None and not len(result):
         print_note(result.when_empty)
     for note in result.notes:
@@ -143,27 +141,9 @@ def print_runs(runs: Sequence[Run]) -> None:
 
 def print_text(text: str, path: Path | None) -> None:
     """Write text to a file or stdout; a terminal shows control characters in it as text."""
-    if path is not None:
-        _write_text(text, path)
+    if path is None:
+        print_lines([text])
         return
-    print_lines([text])
-
-
-def print_drawing(draw: Callable[[int | None, bool], str], path: Path | None) -> None:
-    """Write a drawing to a file or stdout, on a terminal in colours."""
-    if path is not None:
-        _write_text(draw(None, False), path)
-        return
-    stream = data_stream()
-    if stream.isatty():
-        color = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
-        text = draw(shutil.get_terminal_size().columns, color)
-    else:
-        text = draw(None, False)
-    stream.write(f"{text}\n".encode())
-
-
-def _write_text(text: str, path: Path) -> None:
     from msgflow.files.atomic import replacing
 
     with replacing(path) as temporary:
@@ -171,11 +151,20 @@ def _write_text(text: str, path: Path) -> None:
     print_status(f"written to {path}")
 
 
+def print_drawing(draw: Callable[[int | None, bool], str], path: Path | None) -> None:
+    """Write a drawing to a file or stdout, on a terminal in colours."""
+    if path is not None or not is_screen():
+        print_text(draw(None, False), path)
+        return
+    color = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+    # Not as data: a terminal has to obey colours.
+    text = draw(shutil.get_terminal_size().columns, color)
+    sys.stdout.buffer.write(f"{text}\n".encode())
+
+
 def print_lines(lines: Iterable[str]) -> None:
     """Write lines of text to stdout."""
     stream = data_stream()
-    if stream.isatty():
-        stream = terminal(stream)
     for line in lines:
         stream.write(f"{line}\n".encode())
     # Messages on stderr follow the data.
@@ -186,16 +175,10 @@ def print_list(rows: Sequence[tuple[str, str]], titles: tuple[str, str] | None =
     """Write names and their descriptions side by side; a terminal wraps the descriptions."""
     every = [*([titles] if titles else []), *rows]
     width = max(cell_len(name) for name, _ in every)
-    room = max(_LEAST_ROOM, screen_width() - width - 2) if is_screen() else None
-    wrapped = [(name, [text] if room is None else wrap(text, room)) for name, text in every]
-    lines = [
-        f"{name if place == 0 else '':{width}}  {line}"
-        for name, texts in wrapped
-        for place, line in enumerate(texts)
-    ]
+    room = max(width + 2 + _LEAST_ROOM, screen_width()) if is_screen() else sys.maxsize
+    lines = [line for name, text in every for line in hanging(f"{name:{width}}  ", text, room)]
     if titles:
-        longest = max(cell_len(line) for _, texts in wrapped for line in texts)
-        lines.insert(len(wrapped[0][1]), "─" * (width + 2 + longest))
+        lines.insert(1, "─" * max(map(cell_len, lines)))
     print_lines(lines)
 
 
@@ -205,13 +188,14 @@ def discard_stdout() -> None:
 
 
 def data_stream() -> IO[bytes]:
-    """Return stdout as bytes."""
+    """Return stdout as bytes; a terminal gets no control characters, which traces may have."""
     if sys.stdout is None:  # the parent process closed it
         raise UsageError(
             "cannot write to stdout: it is closed", "write to a file, for instance with -o FILE"
         )
     sys.stdout.flush()
-    return sys.stdout.buffer
+    stream = sys.stdout.buffer
+    return cast("IO[bytes]", _Terminal(stream)) if stream.isatty() else stream
 
 
 class _Terminal:
@@ -237,19 +221,12 @@ class _Terminal:
         return True
 
 
-def terminal(stream: IO[bytes]) -> IO[bytes]:
-    """Return a terminal as a binary stream for data from traces, without control characters."""
-    return cast("IO[bytes]", _Terminal(stream))
-
-
 def _width_of_stderr() -> int:
     """Return the width of the terminal of stderr; stdout may go elsewhere."""
-    if os.environ.get("COLUMNS", "").isdigit():
-        return screen_width()
-    try:
-        return os.get_terminal_size(sys.stderr.fileno()).columns or screen_width()
-    except (OSError, ValueError):
-        return screen_width()
+    with suppress(OSError, ValueError):
+        if not os.environ.get("COLUMNS", "").isdigit():
+            return os.get_terminal_size(sys.stderr.fileno()).columns or screen_width()
+    return screen_width()
 
 
 def _fitting(text: str, indent: str, used: int = 0) -> list[str]:

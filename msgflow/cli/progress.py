@@ -81,22 +81,16 @@ def fleet_progress(quiet: bool) -> Iterator[Callable[[FleetProgress], None] | No
         task = bar.add_task("opening", total=None)
 
         def show(progress: FleetProgress) -> None:
-            bar.update(
-                task,
-                description=_fleet_line(progress),
-                total=progress.total,
-                completed=progress.done,
-            )
+            line = _fleet_line(progress)
+            bar.update(task, description=line, total=progress.total, completed=progress.done)
 
         yield show
 
 
 def _fleet_line(progress: FleetProgress) -> str:
     words = [f"{progress.done:,} of {progress.total:,}"]
-    if progress.failed:
-        words.append(f"{progress.failed:,} failed")
-    if progress.retried:
-        words.append(f"{progress.retried:,} tried again")
+    troubles = ((progress.failed, "failed"), (progress.retried, "tried again"))
+    words += [f"{number:,} {what}" for number, what in troubles if number]
     if progress.worked and progress.seconds:
         words.append(f"{60 * progress.worked / progress.seconds:,.1f}/min")
     if (left := progress.seconds_left) is not None:

@@ -19,25 +19,21 @@ def _view_names() -> tuple[str, ...]:
     return public_names()
 
 
-class QueryGroup(TyperGroup):
+class _QueryGroup(TyperGroup):
     """The named queries as commands; a command gets its options when it runs."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of the queries without a command of their own."""
         return [name for name in query_names() if name not in COMMANDS]
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """Print the help of Typer, then the options that every query has."""
         super().format_help(ctx, formatter)
         print_options_of_every_query()
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """Return the command of a query without options; an unknown name is a UsageError."""
         header = load_query(cmd_name, _view_names)
         return TyperCommand(cmd_name, short_help=header.title)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Return the name, the command with the options of the query, and the words behind it."""
         name, found, rest = super().resolve_command(ctx, args)
         header = chosen_by(str(name), rest)
         if header.is_command:
@@ -45,14 +41,12 @@ class QueryGroup(TyperGroup):
         return name, found and build_command(header), rest
 
 
-app = typer.Typer(cls=QueryGroup, subcommand_metavar="[NAME] [OPTIONS]")
+app = typer.Typer(cls=_QueryGroup, subcommand_metavar="[NAME] [OPTIONS]")
 
 
 @app.callback(invoke_without_command=True)
 def group(context: typer.Context) -> None:
     """List the queries, unless one is named."""
-    if context.invoked_subcommand is not None:
-        return
-
-    listed = [(each.words, each.title) for each in load_queries() if not each.is_command]
-    print_list(listed, ("query", "title"))
+    if context.invoked_subcommand is None:
+        listed = [(each.words, each.title) for each in load_queries() if not each.is_command]
+        print_list(listed, ("query", "title"))

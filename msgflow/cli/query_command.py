@@ -52,13 +52,6 @@ def _printed(
 _ASKED = list(parameters_of(Database.query, skipped=("self", "name", "parameters")))
 _PRINTED = list(parameters_of(_printed))
 _DEFAULTS = {each.name: each.default for each in _ASKED}
-# Options that choose the rows of a result, where a query does not do that before it adds them up.
-_CHOOSING = ("via", "without", "slowest")
-COMMON_OPTIONS = frozenset(
-    {*_DEFAULTS, *(each.name for each in _PRINTED), "db", "format", "help"}
-    - {*_CHOOSING, "form", "database"}
-)
-"""Options of every query, whose names no parameter of a query may have."""
 # Parameters of queries without an option: msgflow flow --take ID --why asks for one flow.
 _WITHOUT_OPTION = frozenset(("take",))
 # Their help stands once, in that of `msgflow query`.
@@ -86,27 +79,15 @@ def chosen_by(name: str, words: list[str]) -> Header:
     return choose_query(name, choice_of(load_query(name).variants, words))
 
 
-def chosen_format(form: Format | None, path: Path | None) -> Format:
-    """Return the format for the values of `--format` and `-o`."""
-    return form or format_of(path)
-
-
 def print_rows(result: QueryResult, form: Any, given: dict[str, Any]) -> None:
     """Write the rows as the options of a query say."""
-    print_result(
-        result,
-        form,
-        given["output"],
-        wide=given["wide"],
-        columns=given["columns"],
-        most_rows=given.get("limit") or given.get("slowest") or MOST_ROWS,
-    )
+    most = given.get("limit") or given.get("slowest") or MOST_ROWS
+    shown = {word: given[word] for word in ("output", "wide", "columns")}
+    print_result(result, form, **shown, most_rows=most)
 
 
 class AskingGroup(DefaultGroup):
     """A group whose default command asks the query that is called like the group."""
-
-    query: str
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands, the default one last."""
@@ -116,13 +97,13 @@ class AskingGroup(DefaultGroup):
         """Return a command; the default one has no options yet."""
         if cmd_name != self.default:
             return super().get_command(ctx, cmd_name)
-        return TyperCommand(cmd_name, short_help=load_query(self.query).title)
+        return TyperCommand(cmd_name, short_help=load_query(str(self.name)).title)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the name, the command with the options of the query, and the words behind it."""
         name, found, rest = super().resolve_command(ctx, args)
         if name == self.default:
-            found = build_command(chosen_by(self.query, rest), write=self.write)
+            found = build_command(chosen_by(str(self.name), rest), write=self.write)
         return name, found, rest
 
     def write(self, result: QueryResult, form: Any, given: dict[str, Any]) -> None:
@@ -134,10 +115,13 @@ def build_command(
     header: Header,
     *,
     form: Parameter | None = None,
-    form_of: Callable[[Any, Any], Any] = chosen_format,
+    form_of: Callable[[Any, Any], Any] = lambda form, path: form or format_of(path),
     write: Callable[[QueryResult, Any, dict[str, Any]], None] = print_rows,
 ) -> Any:
-    """Return the command that runs the query of `header`."""
+    """Return the command that runs the query of `header`.
+
+    `form_of` makes a format of the values of `--format` and `-o`.
+    """
 
     def command(**given: Any) -> None:
         own = given_of(given)
@@ -154,7 +138,13 @@ def build_command(
                 "tables for people have times with their units — --times",
                 "--format csv, json, jsonl or parquet, or a file with such a suffix",
             )
-        result = _result(header.name, own, given)
+        said = {
+            word: one_text(given[word])
+            for word, default in _DEFAULTS.items()
+            if given.get(word, default) not in (default, [])
+        }
+        with Database(given["database"], memory_limit=given["memory_limit"]) as database:
+            result = database.query(header.name, **said, **own)
         write(result if times is None else result.with_times(times), form, given)
 
     own = {param.name for param in header.params}
@@ -162,25 +152,15 @@ def build_command(
     printed = [form if form and each.name == "form" else each for each in _PRINTED]
     declared = (param for param in header.params if param.name not in _WITHOUT_OPTION)
     set_parameters(command, [*map(header_parameter, declared), *chosen, *printed])
-    single = typer.Typer(
-        add_completion=False, context_settings={"help_option_names": ["-h", "--help"]}
-    )
+    grain = f"\n\n{header.grain[:1].upper()}{header.grain[1:]}." if header.grain else ""
+    single = typer.Typer(add_completion=False)
     single.command(
         header.words,
         cls=_command_class(header, {form.name} if form else set()),
-        help=_help(header),
+        help=escape(f"{header.title}.\n\n{header.description}{grain}"),
         short_help=header.title,
     )(command)
     return typer.main.get_command(single)
-
-
-def _result(name: str, own: dict[str, Any], given: dict[str, Any]) -> QueryResult:
-    asked = {word: given[word] for word in _DEFAULTS if word in given}
-    said = {
-        word: one_text(value) for word, value in asked.items() if value not in (_DEFAULTS[word], [])
-    }
-    with Database(given["database"], memory_limit=given["memory_limit"]) as database:
-        return database.query(name, **said, **own)
 
 
 def _shown_if_useful(parameter: Parameter, header: Header) -> Parameter:
@@ -229,11 +209,6 @@ def _command_class(header: Header, own: Set[str]) -> type[TyperCommand]:
                 typer.echo(f"{filled}\n")
 
     return QueryCommand
-
-
-def _help(header: Header) -> str:
-    grain = f"\n\n{header.grain[:1].upper()}{header.grain[1:]}." if header.grain else ""
-    return escape(f"{header.title}.\n\n{header.description}{grain}")
 
 
 def print_options_of_every_query() -> None:

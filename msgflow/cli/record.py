@@ -91,21 +91,13 @@ def command(
     left_out = (event.strip() for text in without or () for event in text.split(","))
     full_names = tuple(event if ":" in event else f"ros2:{event}" for event in left_out if event)
     with _status_shown(beside_program=bool(program)) as show:
+        every = (*EVENTS, *(events or []))
         recorded = record(
-            target.absolute(),
-            name=name,
-            channel=Channel(
-                (*EVENTS, *(events or [])), subbuf_size, num_subbuf, without=full_names
-            ),
-            program=program or (),
-            seconds=duration,
-            kernel=kernel,
-            snapshot=dual,
-            python=python,
-            profile=None if profile is None else read_rate(profile),
-            note=print_note,
-            show=show,
-        )
+            target.absolute(), name=name,
+            channel=Channel(every, subbuf_size, num_subbuf, without=full_names),
+            program=program or (), seconds=duration, kernel=kernel, snapshot=dual, python=python,
+            profile=None if profile is None else read_rate(profile), note=print_note, show=show,
+        )  # fmt: skip
     print_status(f"recorded into {target}: {_words(recorded.last)}")
     if program and recorded.exit_code:
         print_note(f"{program[0]} ended with exit code {recorded.exit_code}")
@@ -113,15 +105,9 @@ def command(
     if ingest:
         # What is wrong is printed by check.
         ingest_command.command(
-            [str(target)],
-            name=name,
-            together=True,
-            events=events or [],
-            links=links,
-            clock_sync=clock_sync,
-            quiet=True,
-            database=database,
-        )
+            [str(target)], name=name, together=True, events=events or [], links=links,
+            clock_sync=clock_sync, quiet=True, database=database,
+        )  # fmt: skip
         print_status(f"read into {database} as run {name}")
         try:
             check.command(database=database)

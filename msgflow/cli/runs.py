@@ -11,7 +11,7 @@ import typer
 from msgflow.cli.completion import complete
 from msgflow.cli.operation import operation
 from msgflow.cli.options import DefaultGroup
-from msgflow.cli.output import Shown, confirm, is_asked, print_result, print_status
+from msgflow.cli.output import Shown, confirm, print_result, print_status
 from msgflow.database import Database
 from msgflow.errors import ExitCode, UsageError
 from msgflow.run.choice import choose_runs
@@ -82,7 +82,7 @@ def remove(
         run: Name or id of the run, or all.
         yes: Ask nothing on a terminal either.
     """
-    if not yes and is_asked():
+    if not yes:
         runs = choose_runs(database.runs(), run)
         # Other programs can use the database until the user answers.
         database.close()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -36,21 +36,16 @@ def print_sections(
 ) -> None:
     """Print results; `brief` returns the lines of a table of a width, where people read it."""
     if form == "json":
-        lines = _json_lines(results)
+        sections = []
+        for section, result in results.items():
+            rows = ",\n    ".join(json_rows(result))
+            sections.append(f"  {json.dumps(section)}: [{rows}]")
+        lines: Iterable[str] = ("{", ",\n".join(sections), "}")
     elif form == "table" and brief is not None:
         lines = brief(screen_width())
     else:
         lines = _whole_sections(results, form)
     print_text("\n".join(lines), output)
-
-
-def _json_lines(results: Mapping[str, QueryResult]) -> Iterator[str]:
-    yield "{"
-    for position, (section, result) in enumerate(results.items(), start=1):
-        rows = ",\n    ".join(json_rows(result))
-        comma = "," if position < len(results) else ""
-        yield f"  {json.dumps(section)}: [{rows}]{comma}"
-    yield "}"
 
 
 def screen_sections(

@@ -14,8 +14,6 @@ from msgflow.db.memory import bound_process, default_limit
 from msgflow.result.query_result import QueryResult
 
 if TYPE_CHECKING:
-    import pyarrow as pa
-
     Write = Callable[[Any], int]
 
 _ROWS_AT_ONCE = 100_000
@@ -32,7 +30,10 @@ def answer(
     with Database(path, memory_limit=memory_limit or default_limit()) as database:
         bound_process(database.connection)
         result = database.sql(text, limit=limit)
-        table = _cut(result.table)
+        table = result.table
+        while len(table) and table.nbytes > MOST_BYTES:
+            # Rows differ in size: the first may take more than their share.
+            table = table.slice(0, len(table) * MOST_BYTES // table.nbytes)
         said = list(result.notes)
         if len(table) < len(result):
             said.append(
@@ -44,14 +45,6 @@ def answer(
             writer.write_table(table, max_chunksize=_ROWS_AT_ONCE)
 
 
-def _cut(table: pa.Table) -> pa.Table:
-    """Return as many of the first rows as a page can show."""
-    while len(table) and table.nbytes > MOST_BYTES:
-        # Rows differ in size: the first may take more than their share.
-        table = table.slice(0, len(table) * MOST_BYTES // table.nbytes)
-    return table
-
-
 class WarmSql:
     """SQL on one database, query after query in one child process, which starts with the first.
 
@@ -60,8 +53,7 @@ class WarmSql:
     """
 
     def __init__(self, path: Path, *, memory_limit: str | None, seconds: float) -> None:
-        self._path = path
-        self._memory_limit = memory_limit
+        self._given = {"path": str(path), "memory_limit": memory_limit}
         self._seconds = seconds
         self._process: ConfinedProcess | None = None
 
@@ -71,15 +63,8 @@ class WarmSql:
 
         if self._process is None:
             self._process = ConfinedProcess(__name__, seconds=self._seconds)
-        content = self._process.call(
-            "answer",
-            {
-                "path": str(self._path),
-                "memory_limit": self._memory_limit,
-                "text": text,
-                "limit": limit,
-            },
-        )
+        given = self._given | {"text": text, "limit": limit}
+        content = self._process.call("answer", given)
         with pa.ipc.open_stream(pa.py_buffer(content)) as reader:
             table = reader.read_all()
         notes = json.loads(table.schema.metadata[b"notes"])

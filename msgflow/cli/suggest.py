@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +9,7 @@ import typer
 
 from msgflow.cli.operation import operation
 from msgflow.cli.output import (
-    database_option,
+    command_text,
     print_next,
     print_note,
     print_runs,
@@ -25,7 +24,6 @@ from msgflow.text.values import count
 app = typer.Typer()
 
 _SUGGEST = ("msgflow", "suggest")
-_TARGETS = "targets.yaml"
 
 
 @app.command("links")
@@ -56,8 +54,6 @@ def links(
         )
     path = output or (DEFAULT_LINKS if apply else None)
     words = ["msgflow", "links", "apply", str(path or "FILE")]
-    words += ["--run", run] if run is not None else []
-    words += database_option(database.path)
     found = database.suggest_links(run=run)
     print_runs(found.runs)
     if found.doubtful:
@@ -66,7 +62,7 @@ def links(
             " doubtful, see the comments: "
             + ", ".join(dict.fromkeys(row["node"] for row in found.doubtful))
         )
-    text = found.text(shlex.join(words))
+    text = found.text(command_text(words, database.path, run))
     if path is None or not apply or not found.certain:
         print_text(text, path)
         if apply:
@@ -131,7 +127,7 @@ def targets(
     if text.endswith("targets: []"):
         print_note("nothing was measured often enough to suggest a requirement for it")
     elif output is None:
-        print_next([*_SUGGEST, "targets", "-o", _TARGETS], database.path, run)
+        print_next([*_SUGGEST, "targets", "-o", "targets.yaml"], database.path, run)
     else:
         # Another run is what they are for.
         print_next(["msgflow", "verify", str(output)], database.path)

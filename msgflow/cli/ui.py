@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from contextlib import closing
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +15,7 @@ from msgflow.cli.options import LAKE_PAGE
 from msgflow.cli.output import print_note, print_status
 from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
-from msgflow.sql.interrupt import Interrupts, noted_interrupts
+from msgflow.sql.interrupt import noted_interrupts
 
 _SECONDS_BETWEEN_CHECKS = 0.1
 
@@ -46,10 +46,19 @@ def command(
             4GB.
     """
     from msgflow.cli.sql_process import WarmSql
-    from msgflow.view.server import serving, serving_application, single_application
+    from msgflow.view.server import serving
     from msgflow.view.sql_page import MOST_SECONDS
 
-    def show(address: str, interrupts: Interrupts) -> None:
+    with ExitStack() as stack:
+        if lake is not None:
+            server = _serving_lake(lake, where, port)
+        else:
+            require_no_where(where)
+            sql = WarmSql(database, memory_limit=memory_limit, seconds=MOST_SECONDS)
+            stack.callback(sql.close)
+            server = serving(database, sql, port=port, memory_limit=memory_limit)
+        interrupts = stack.enter_context(noted_interrupts())
+        address = stack.enter_context(server)
         print_status(address)
         print_status("Ctrl-C ends it")
         if browser and not _open(address):
@@ -58,17 +67,11 @@ def command(
             interrupts.check()
             time.sleep(_SECONDS_BETWEEN_CHECKS)
 
-    if lake is None:
-        require_no_where(where)
-        with (
-            closing(WarmSql(database, memory_limit=memory_limit, seconds=MOST_SECONDS)) as sql,
-            noted_interrupts() as interrupts,
-            serving(database, sql, port=port, memory_limit=memory_limit) as address,
-        ):
-            show(address, interrupts)
-        return
+
+def _serving_lake(lake: str, where: str | None, port: int | None) -> AbstractContextManager[str]:
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_page import lake_page
+    from msgflow.view.server import serving_application, single_application
 
     opened = Lake.open(lake)
     # Made once before the browser asks, so that errors are printed here.
@@ -78,11 +81,7 @@ def command(
         return first.pop() if first else lake_page(opened, where=where).content
 
     place = lake if "://" in lake else os.path.realpath(lake)
-    with (
-        noted_interrupts() as interrupts,
-        serving_application(place, port, lambda token: single_application(page, token)) as address,
-    ):
-        show(address, interrupts)
+    return serving_application(place, port, lambda token: single_application(page, token))
 
 
 def require_no_where(where: str | None) -> None:

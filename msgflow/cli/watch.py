@@ -30,7 +30,6 @@ from msgflow.text.values import printable
 
 if TYPE_CHECKING:
     from msgflow.record.recording import Status
-    from msgflow.watch.alarm import Alarm
     from msgflow.watch.diagnostics import Diagnostics
     from msgflow.watch.window_database import WindowDatabase
     from msgflow.watch.window_report import WindowReport
@@ -101,13 +100,13 @@ def command(
         output (DIR): Directory to record COMMAND into; by default a temporary one, of the last
             chunks.
     """
-    from msgflow.cli.show.watch_screen import show_screen
-    from msgflow.cli.show.window_line import window_line
+    from msgflow.cli.show.watch_screen import show_screen, window_line
     from msgflow.clocks.clocks_file import read_clock_sync
     from msgflow.links.links_file import read_links
     from msgflow.sql.interrupt import until_interrupted
+    from msgflow.verify.targets_file import read_targets
     from msgflow.verify.verify import Verdict
-    from msgflow.watch.alarm import violation_line
+    from msgflow.watch.alarm import Alarm, violation_line
     from msgflow.watch.diagnostics import Diagnostics
     from msgflow.watch.flight_recorder import FlightRecorder
     from msgflow.watch.follow import watch_finished, watch_live
@@ -128,7 +127,10 @@ def command(
         )
     if diagnostics and targets is None:
         raise UsageError("--diagnostics tells the verdicts on targets", "--targets targets.yaml")
-    alarm = None if targets is None else _alarm(targets, paths, with_flows=diagnostics)
+    alarm = None
+    if targets is not None:
+        file = read_targets(targets)
+        alarm = Alarm(file, named_places(file, paths), print_note, with_flows=diagnostics)
     # Where stdout is closed, nothing starts.
     on_screen = is_screen() and not json
     exporter = None
@@ -140,45 +142,30 @@ def command(
         recorder = None
         if keep_on_violation is not None:
             recorder = FlightRecorder(
-                keep_on_violation.absolute(),
-                most=keep_most,
-                window_ns=window_ns,
-                earlier_ns=earlier_ns,
-                clock_sync=clock_sync,
-                note=print_note,
-            )
+                keep_on_violation.absolute(), most=keep_most, window_ns=window_ns,
+                earlier_ns=earlier_ns, clock_sync=clock_sync, note=print_note,
+            )  # fmt: skip
             stack.callback(recorder.close)
         watcher = Watcher(
-            window_ns=window_ns,
-            step_ns=step_ns,
-            late_ns=late_ns,
+            window_ns=window_ns, step_ns=step_ns, late_ns=late_ns,
             links=None if links is None else read_links(links),
             clocks=read_clock_sync(clock_sync),
-            note=print_note,
-            alarm=alarm,
-            recorder=recorder,
-            exporter=exporter,
-            database=database,
+            note=print_note, alarm=alarm, recorder=recorder, exporter=exporter, database=database,
             has_node=diagnostics,
-        )
+        )  # fmt: skip
         stack.callback(watcher.close)
         publisher = stack.enter_context(closing(Diagnostics())) if diagnostics else None
 
         def show(reports: Iterator[WindowReport]) -> None:
             if publisher is not None:
                 reports = _published(reports, publisher)
-            if json:
-                for report in reports:
-                    print_lines([report.to_json()])
-            elif on_screen:
+            if on_screen:
                 show_screen(reports)
-            else:
-                for report in reports:
-                    violated = [
-                        f"violation: {printable(violation_line(each))}"
-                        for each in report.violations
-                    ]
-                    print_lines([window_line(report), *violated])
+                return
+            for report in reports:
+                violated = (f"violation: {violation_line(each)}" for each in report.violations)
+                text = [window_line(report), *map(printable, violated)]
+                print_lines([report.to_json()] if json else text)
 
         def live(place: Path, is_over: Callable[[], bool]) -> None:
             show(watch_live(place, watcher, step_ns=step_ns, is_over=is_over, note=print_note))
@@ -272,14 +259,6 @@ def _published(reports: Iterator[WindowReport], publisher: Diagnostics) -> Itera
         yield report
 
 
-def _alarm(targets: Path, paths: Path, *, with_flows: bool) -> Alarm:
-    from msgflow.verify.targets_file import read_targets
-    from msgflow.watch.alarm import Alarm
-
-    file = read_targets(targets)
-    return Alarm(file, named_places(file, paths), print_note, with_flows=with_flows)
-
-
 def _free(name: str) -> Path:
     """Return a path where nothing is, also no link that leads nowhere."""
     path = Path(name)
@@ -316,14 +295,9 @@ def _record(
 
         try:
             recorded = record(
-                target,
-                name=name,
-                channel=Channel(rotation_ns=step_ns),
-                program=words,
-                log=log,
-                note=print_note,
-                show=show,
-            )
+                target, name=name, channel=Channel(rotation_ns=step_ns), program=words, log=log,
+                note=print_note, show=show,
+            )  # fmt: skip
         finally:
             ended.set()
         watching.result()

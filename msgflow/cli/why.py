@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from msgflow.cli.operation import asks
-from msgflow.cli.output import database_option, print_note, print_runs, print_status
+from msgflow.cli.output import command_text, print_note, print_runs, print_status
 from msgflow.cli.sections import SectionsFormat, chosen_format, print_sections, screen_sections
 from msgflow.database import Database
 from msgflow.files.default_files import DEFAULT_DATABASE
@@ -75,7 +74,12 @@ def command(
     form = chosen_format(form, output)
     print_runs([found.run])
     print_sections(found.sections, form, output, None if wide else partial(_brief, found))
-    for note in [*_more(found, part, database), *found.notes]:
+    if (more := len(found.paths) - _PATHS) > 0:
+        ends = ("--to", found.place) if found.place else ()
+        paths = "1 more path" if more == 1 else f"{more} more paths"
+        whole = part | {"start": found.start}
+        print_note(f"{paths}: {_command(('query', 'e2e-latency', *ends), whole, database)}")
+    for note in found.notes:
         print_note(note)
     for step in found.steps:
         print_status(f"next: {_command(step, part, database)}")
@@ -119,20 +123,11 @@ def _in_words(rows: QueryResult) -> QueryResult:
     return replace(rows, table=table)
 
 
-def _more(found: Explanation, part: SliceWords, database: Path) -> Iterator[str]:
-    if (more := len(found.paths) - _PATHS) > 0:
-        ends = ("--to", found.place) if found.place else ()
-        paths = "1 more path" if more == 1 else f"{more} more paths"
-        part = part | {"start": found.start}
-        yield f"{paths}: {_command(('query', 'e2e-latency', *ends), part, database)}"
-
-
 def _command(step: tuple[str, ...], part: SliceWords, database: Path) -> str:
-    """Return a command that runs as it is printed."""
     # Of a flow the identity tells the run; suggestions are from all of a run.
     taken = {"query": part, "suggest": {"run": part.get("run")}}.get(step[0], {})
     words = ["msgflow", *step]
     for name, value in taken.items():
         if value is not None:
             words += [f"--{name.replace('_', '-')}", str(value)]
-    return shlex.join([*words, *database_option(database)])
+    return command_text(words, database)

@@ -60,11 +60,8 @@ def _into_stream(path: Path) -> Iterator[Path]:
         temporary = Path(directory) / path.name
         yield temporary
         # If stdout were opened by its name, writing would begin at the start of the file.
-        is_stdout = _is_stdout(path)
-        with (
-            temporary.open("rb") as source,
-            open(os.dup(_STDOUT) if is_stdout else path, "wb") as stream,
-        ):
+        target = os.dup(_STDOUT) if _is_stdout(path) else path
+        with temporary.open("rb") as source, open(target, "wb") as stream:
             shutil.copyfileobj(source, stream)
 
 

@@ -27,23 +27,22 @@ def replacing_entries(
 
     An error or an interrupt before that leaves `directory` as it was. Other entries stay.
     """
-    for name in names:
-        if Path(name).name != name:
-            raise ValueError(f"not the name of an entry: {name!r}")
     _clean_up(directory)
     _refuse_existing(directory, names, force)
     aside = directory / f"{_ASIDE}{mark()}{_SUFFIX}"
     is_new = not directory.exists()
+    action = "create"
     try:
-        try:
-            aside.mkdir(parents=True)
-        except OSError as error:
-            raise _cannot("create the directory", error, directory) from error
-        try:
-            yield aside
-            _publish(directory, aside, names)
-        except OSError as error:
-            raise _cannot("write to the directory", error, directory) from error
+        aside.mkdir(parents=True)
+        action = "write to"
+        yield aside
+        _publish(directory, aside, names)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise UsageError(
+            f"cannot {action} the directory: {reason} — {directory}",
+            "give a directory in a place that exists and can be written",
+        ) from error
     finally:
         shutil.rmtree(aside, ignore_errors=True)
         if is_new and directory.is_dir() and not any(directory.iterdir()):
@@ -110,12 +109,4 @@ def _is_exported(path: Path) -> bool:
             for file in partition.iterdir()
         )
         for partition in path.iterdir()
-    )
-
-
-def _cannot(action: str, error: OSError, directory: Path) -> UsageError:
-    reason = (error.strerror or str(error)).lower()
-    return UsageError(
-        f"cannot {action}: {reason} — {directory}",
-        "give a directory in a place that exists and can be written",
     )

@@ -35,16 +35,19 @@ def is_abandoned(text: str) -> bool:
     return _start(int(found[2])) != int(found[3])
 
 
-def left_behind(folder: Path, prefix: str, suffix: str, *, by_others: bool = False) -> list[Path]:
+def left_behind(
+    folder: Path, prefix: str, suffix: str = "", *, by_others: bool = False
+) -> list[Path]:
     """Return what processes that ended left in a folder, named by prefix, mark and suffix.
 
-    `by_others` says that no other process is at work there: what is not of this one was left.
+    Behind a dot, more may follow the mark. `by_others` says that no other process is at work there:
+    what is not of this one was left.
     """
     found = []
     with contextlib.suppress(OSError):
         for entry in folder.iterdir():
             if entry.name.startswith(prefix) and entry.name.endswith(suffix):
-                owner = entry.name[len(prefix) : -len(suffix)]
+                owner = entry.name.removeprefix(prefix).removesuffix(suffix).partition(".")[0]
                 if is_abandoned(owner) or (by_others and owner != mark()):
                     found.append(entry)
     return found
@@ -65,9 +68,8 @@ def temporary_directory(prefix: str, parent: str | None = None) -> Iterator[Path
 
 def remove_abandoned_directories(prefix: str, root: Path | None = None) -> None:
     """Remove what `temporary_directory` made in processes that were killed."""
-    for left in (root or Path(tempfile.gettempdir())).glob(f"{prefix}*"):
-        if is_abandoned(left.name.removeprefix(prefix).rpartition(".")[0]):
-            shutil.rmtree(left, ignore_errors=True)
+    for left in left_behind(root or Path(tempfile.gettempdir()), prefix):
+        shutil.rmtree(left, ignore_errors=True)
 
 
 @cache

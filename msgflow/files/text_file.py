@@ -15,11 +15,9 @@ def read_text(path: Path, what: str, hint: str) -> str:
     """Return the text of a file."""
     try:
         content = read_regular(path, MOST_BYTES)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
+    except (OSError, ValueError) as error:  # such as a NUL in the path
+        reason = (getattr(error, "strerror", None) or str(error)).lower()
         raise UsageError(f"{what}: {reason} — {path}", hint) from error
-    except ValueError as error:  # such as a NUL in the path
-        raise UsageError(f"{what}: {error} — {path}", hint) from error
     try:
         return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -135,17 +133,11 @@ def quoted(text: str) -> str:
 
 def in_quotes(text: str) -> str:
     """Return a text in quotes, on one line, which YAML reads as the same text."""
-    if text.isprintable():
-        return json.dumps(text, ensure_ascii=False)
     # JSON leaves characters as they are that end a line of YAML, or that YAML forbids.
-    from ruamel.yaml import YAML
-
-    yaml: Any = YAML(typ="safe", pure=True)
-    stream = StringIO()
-    yaml.default_style = '"'
-    yaml.width = sys.maxsize
-    yaml.dump(text, stream)
-    return stream.getvalue().rstrip("\n")
+    return "".join(
+        each if each.isprintable() else f"\\U{ord(each):08x}"
+        for each in json.dumps(text, ensure_ascii=False)
+    )
 
 
 def list_lines(key: str, items: Sequence[str], width: int = _WIDTH) -> list[str]:

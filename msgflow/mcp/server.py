@@ -13,7 +13,8 @@ import json
 import tempfile
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
+from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -90,7 +91,7 @@ def make_server(path: Path, *, seconds: float = MOST_SECONDS) -> MCPServer[Any]:
 
         return call
 
-    tools = _Tools(path)
+    tools = _Tools(Database(path))
     for name in vars(_Tools):
         if not name.startswith("_"):
             server.tool(structured_output=False)(confined(getattr(tools, name)))
@@ -101,31 +102,43 @@ def answer(
     write: Callable[[Any], int], *, path: str, memory_limit: str, tool: str, given: dict[str, Any]
 ) -> None:
     """Write what a tool answers, in the child."""
-    text: str = getattr(_Tools(Path(path), memory_limit), tool)(**given)
+    with Database(path, memory_limit=memory_limit) as database:
+        try:
+            text: str = getattr(_Tools(database), tool)(**given)
+        except Exception as error:
+            if isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
+                raise QueryError(
+                    f"it takes more memory than {memory_limit}",
+                    "read one run, a shorter time (start, end), or fewer columns",
+                ) from error
+            raise
     write(text.encode(errors="replace"))
 
 
 class _Tools:
     """What agents may call: each method is a tool, its docstring what they read."""
 
-    def __init__(self, path: Path, memory_limit: str = MEMORY_LIMIT) -> None:
-        self._path = path
-        self._memory_limit = memory_limit
+    def __init__(self, database: Database) -> None:
+        self._unbound = database
+
+    @functools.cached_property
+    def _database(self) -> Database:
+        # Opened by what needs it: list_queries does not.
+        bound_process(self._unbound.connection)
+        return self._unbound
 
     def info(self) -> str:
         """List the runs (recordings) in the database, oldest first: name, time, events, labels."""
-        with self._opened() as database:
-            return _rows(database.query("info", run="all"))
+        return _rows(self._database.query("info", run="all"))
 
     def check(self, run: str | None = None) -> str:
         """Tell what is wrong with a recording, errors first, each with cause and cure.
 
         run: name, id, KEY=VALUE or 'all'; the latest when not given.
         """
-        with self._opened() as database:
-            findings = database.findings(run=run)
-        rows = (json.dumps(asdict(finding), default=str) for finding in findings)
-        return _answer((), map(_with_short_cells, rows))
+        findings = map(asdict, self._database.findings(run=run))
+        rows = (_with_short_cells(json.dumps(each, default=str)) for each in findings)
+        return _answer((), rows)
 
     def list_queries(self, name: str | None = None) -> str:
         """List the named queries; with a name, explain that query: parameters and columns."""
@@ -166,30 +179,21 @@ class _Tools:
             "node": node, "topic": topic, "callback": callback, "host": host, "via": via,
             "without": without, "where": where, "sort": sort, "slowest": slowest,
         }  # fmt: skip
-        with self._opened() as database:
-            own = _own(name, parameters or {})
-            result = database.query(
-                name,
-                run=run,
-                start=start,
-                end=end,
-                internal=internal,
-                **{word: value for word, value in words.items() if value and word not in own},
-                **own,
-            )
-            if columns:
-                result = result.with_columns(columns)
-            return _rows(result, limit)
+        database, own = self._database, _own(name, parameters or {})
+        chosen = {word: value for word, value in words.items() if value and word not in own}
+        result = database.query(
+            name, run=run, start=start, end=end, internal=internal, **chosen, **own
+        )
+        return _rows(result.with_columns(columns) if columns else result, limit)
 
     def schema(self, view: str | None = None) -> str:
         """List the views that SQL can read; with the name of a view, its columns."""
-        with self._opened() as database:
-            return _rows(database.views() if view is None else database.schema(view), MOST_ROWS)
+        database = self._database
+        return _rows(database.views() if view is None else database.schema(view), MOST_ROWS)
 
     def sql(self, query: str, limit: int = DEFAULT_ROWS) -> str:
         """Run SQL (DuckDB) that only reads the views of the database; see schema."""
-        with self._opened() as database:
-            return _rows(database.sql(query, limit=_capped(limit)), limit)
+        return _rows(self._database.sql(query, limit=_capped(limit)), limit)
 
     def flow(
         self,
@@ -207,18 +211,12 @@ class _Tools:
         Give a topic (at: first message at or after that time, seconds from the start of the run) or
         one of the ids. direction: 'forward', 'backward' or 'both'.
         """
-        with self._opened() as database:
-            flow = database.flow(
-                topic,
-                at=at,
-                publication_id=publication_id,
-                take_id=take_id,
-                callback_instance_id=callback_instance_id,
-                run=run,
-                direction=direction,
-                limit=_capped(limit),
-            )
-            text = tree_text(flow)
+        flow = self._database.flow(
+            topic, at=at, publication_id=publication_id, take_id=take_id,
+            callback_instance_id=callback_instance_id, run=run, direction=direction,
+            limit=_capped(limit),
+        )  # fmt: skip
+        text = tree_text(flow)
         notes = [f"note: {note}" for note in flow.notes]
         if len(text) > MOST_CHARACTERS:
             text = text[:MOST_CHARACTERS].rpartition("\n")[0]
@@ -237,8 +235,7 @@ class _Tools:
         place: topic or node where the flows end; by default all ends. run, start,
         end: as for run_query.
         """
-        with self._opened() as database:
-            found = database.why(place, run=run, start=start, end=end)
+        found = self._database.why(place, run=run, start=start, end=end)
         rows = (
             json.dumps({"section": name} | json.loads(_with_short_cells(row)), ensure_ascii=False)
             for name, result in found.sections.items()
@@ -260,9 +257,8 @@ class _Tools:
         run_a, run_b: baseline, and what to compare with it: name or id. Or run and window, such as
         ['0s..60s', '60s..120s']. what: 'paths', 'ends' (between two topics), 'callbacks', 'topics'.
         """
-        with self._opened() as database:
-            found = database.compare(run_a, run_b, run=run, window=window or (), what=what)
-            return _rows(found.changes(only_different=False), limit)
+        found = self._database.compare(run_a, run_b, run=run, window=window or (), what=what)
+        return _rows(found.changes(only_different=False), limit)
 
     def verify(self, requirements: str, run: str | None = None) -> str:
         """Check a run against requirements: passed, failed, not measured, no data.
@@ -270,24 +266,10 @@ class _Tools:
         requirements: YAML, such as 'targets: [{path: [/scan, /cmd], latency: "p99 < 50 ms"}]'. run:
         name or id; the latest when not given.
         """
-        with tempfile.TemporaryDirectory() as directory, self._opened() as database:
+        with tempfile.TemporaryDirectory() as directory:
             file = Path(directory) / "requirements.yaml"
             file.write_text(requirements, encoding="utf-8")
-            return _rows(database.verify(file, run=run).result, MOST_ROWS)
-
-    @contextlib.contextmanager
-    def _opened(self) -> Iterator[Database]:
-        with Database(self._path, memory_limit=self._memory_limit) as database:
-            bound_process(database.connection)
-            try:
-                yield database
-            except Exception as error:
-                if isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
-                    raise QueryError(
-                        f"it takes more memory than {self._memory_limit}",
-                        "read one run, a shorter time (start, end), or fewer columns",
-                    ) from error
-                raise
+            return _rows(self._database.verify(file, run=run).result, MOST_ROWS)
 
 
 @contextlib.contextmanager
@@ -316,20 +298,14 @@ def _refuse_unknown(tool: str, arguments: dict[str, Any], known: Sequence[str]) 
         return
     hint = f"it has {', '.join(known)}" if known else "it has none: call it without"
     if tool == "run_query":
-        inner = _parameters_of(arguments.get("name"))
+        query = arguments.get("name")
+        inner = [param.name for param in load_query(query).params] if query in query_names() else []
         if misplaced := {word: arguments[word] for word in unknown if word in inner}:
             given = json.dumps(misplaced, ensure_ascii=False, default=str)
             hint = f"put what is the query's own into parameters: {given}"
         elif inner:
-            hint += f"; in parameters, {arguments['name']} takes {', '.join(inner)}"
+            hint += f"; in parameters, {query} takes {', '.join(inner)}"
     raise UsageError(f"{tool} has no such argument — {', '.join(unknown)}", hint)
-
-
-def _parameters_of(query: object) -> list[str]:
-    """Return the names of a query's parameters; of none where there is no such query."""
-    if not isinstance(query, str) or query not in query_names():
-        return []
-    return [param.name for param in load_query(query).params]
 
 
 def _own(name: str, parameters: dict[str, Any]) -> dict[str, Any]:
@@ -344,24 +320,16 @@ def _own(name: str, parameters: dict[str, Any]) -> dict[str, Any]:
 
 
 def _explained(header: Header) -> dict[str, Any]:
-    return {
-        "name": header.name,
-        "title": header.title,
-        "description": header.description,
-        "grain": header.grain,
-        "parameters": [
-            {
-                "name": param.name,
-                "type": param.type,
-                "default": param.default,
-                "required": not param.has_default,
-                "choices": list(param.choices),
-                "description": param.description,
-            }
-            for param in header.params
-        ],
-        "columns": [asdict(column) for column in header.columns],
-    }
+    parameters = [
+        {
+            "name": param.name, "type": param.type, "default": param.default,
+            "required": not param.has_default, "choices": list(param.choices),
+            "description": param.description,
+        }
+        for param in header.params
+    ]  # fmt: skip
+    words = {word: getattr(header, word) for word in ("name", "title", "description", "grain")}
+    return words | {"parameters": parameters, "columns": list(map(asdict, header.columns))}
 
 
 def _capped(limit: int) -> int:
@@ -373,9 +341,8 @@ def _rows(result: QueryResult, limit: int = DEFAULT_ROWS) -> str:
     notes = list(result.notes)
     if len(result) > most:
         notes.append(f"only the first {most} of {len(result):,} rows; limit allows {MOST_ROWS:,}")
-    first = replace(result, table=result.table.slice(0, most))
     titles = [run.title for run in result.runs]
-    return _answer(titles, map(_with_short_cells, json_rows(first)), notes)
+    return _answer(titles, map(_with_short_cells, json_rows(result.first(most))), notes)
 
 
 def _with_short_cells(text: str) -> str:
@@ -391,7 +358,6 @@ def _with_short_cells(text: str) -> str:
 
 
 def _short(text: str) -> str:
-    """Return a text that is cut where it is long, which it says."""
     if len(text) <= MOST_IN_CELL:
         return text
     return f"{text[:MOST_IN_CELL]}… ({len(text):,} characters)"
@@ -400,13 +366,8 @@ def _short(text: str) -> str:
 def _answer(runs: Sequence[str], rows: Iterable[str], notes: Sequence[str] = ()) -> str:
     """Return JSON of the titles of runs, the notes, and as many rows as there is room for."""
     texts = list(rows)
-    room = MOST_CHARACTERS
-    shown: list[str] = []
-    for text in texts:
-        room -= len(text)
-        if room < 0:
-            break
-        shown.append(text)
+    sizes = accumulate(map(len, texts))
+    shown = [text for text, size in zip(texts, sizes, strict=True) if size <= MOST_CHARACTERS]
     if len(shown) < len(texts):
         notes = [
             *notes,

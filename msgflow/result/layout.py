@@ -102,9 +102,8 @@ def lay_out(
     headings: tuple[str, ...] = ()
     if header is not None:
         columns, headings = _with_headings(header, columns)
-    notes = []
-    if first.num_rows < len(result):
-        notes.append(f"the first {first.num_rows} of {len(result):,} rows: {remedy}")
+    cut = f"the first {first.num_rows} of {len(result):,} rows: {remedy}"
+    notes = (cut,) if first.num_rows < len(result) else ()
     if header is not None and not is_whole:
         shown = _columns_that_fit(header, result.order, columns, width)
     else:
@@ -119,7 +118,7 @@ def lay_out(
         shown, left_out = columns, []
     widths = tuple(_widths(shown, width)) if is_table else None
     not_shown = _not_shown(left_out, nothing, zero_rows, width, remedy) if first.num_rows else None
-    return Layout(headings, tuple(shown), widths, paths, tuple(notes), not_shown)
+    return Layout(headings, tuple(shown), widths, paths, notes, not_shown)
 
 
 def _without_zero_rows(result: Rows, header: Header) -> tuple[Rows, int]:
@@ -327,11 +326,8 @@ def _widths(columns: list[ShownColumn], width: int) -> list[int]:
         return widths
     # First the widest columns become narrower; then columns trade cells.
     while sum(widths) > free:
-        widest = max(
-            (place for place, column in enumerate(columns) if widths[place] > column.least),
-            key=lambda place: widths[place],
-        )
-        widths[widest] -= 1
+        wide = [place for place, column in enumerate(columns) if widths[place] > column.least]
+        widths[max(wide, key=widths.__getitem__)] -= 1
     return _balanced(columns, widths)
 
 

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
-from msgflow.result.rows import Rows, Times
+from msgflow.result.rows import Rows, Times, cells
 from msgflow.text.name_suggestions import column_named
+from msgflow.text.values import printable
+from msgflow.text.wrapping import hanging
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
     import pyarrow as pa
+
+_STYLE = "text-align: {}; white-space: pre-wrap"
 
 
 @dataclass(frozen=True, repr=False)
@@ -39,14 +44,43 @@ class QueryResult(Rows):
         return f"<QueryResult of {name}: {len(self)} rows>"
 
     def __str__(self) -> str:
-        from msgflow.result.result_text import result_text
+        from msgflow.result.layout import lay_out, screen_width
+        from msgflow.result.screen import screen_lines
 
-        return result_text(self)
+        width = screen_width()
+        shown = lay_out(self, width, remedy="to_arrow() has all")
+        label = "run: " if len(self.runs) == 1 else "runs: "
+        runs = printable(", ".join(run.title for run in self.runs))
+        lines = hanging(label, runs, width) if runs else []
+        lines += screen_lines(shown, width)
+        lines += [] if shown.not_shown is None else [shown.not_shown]
+        for note in (*shown.notes, *self._said()):
+            lines += hanging("note: ", printable(note), width)
+        return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        from msgflow.result.result_text import result_html
+        from msgflow.result.layout import MOST_ROWS
 
-        return result_html(self)
+        names, columns, right = cells(self.first(MOST_ROWS))
+        styles = [_STYLE.format("right" if is_right else "left") for is_right in right]
+
+        def row(tag: str, texts: Sequence[str]) -> str:
+            # Names from a trace are always text in it.
+            shown = (
+                f'<{tag} style="{style}">{escape(text)}</{tag}>'
+                for text, style in zip(texts, styles, strict=True)
+            )
+            return f"<tr>{''.join(shown)}</tr>"
+
+        title = "" if self.header is None else f"<caption>{escape(self.header.title)}</caption>"
+        body = "".join(row("td", texts) for texts in zip(*columns, strict=True))
+        more = [f"the first {MOST_ROWS} of {len(self):,} rows"] if len(self) > MOST_ROWS else []
+        notes = "".join(f"<p>{escape(note)}</p>" for note in (*more, *self._said()))
+        head = f"{title}<thead>{row('th', names)}</thead>"
+        return f"<table>{head}<tbody>{body}</tbody></table>{notes}"
+
+    def _said(self) -> list[str]:
+        return self.notes if len(self) else [self.when_empty, *self.notes]
 
     def with_times(self, times: str) -> QueryResult:
         """Return the rows with points in time and durations in another form.

@@ -55,7 +55,6 @@ def _seconds(column: Any) -> Any:
 
 
 def _simulated(column: Any, moments: Sequence[tuple[int, int]]) -> Any:
-    """Return seconds of simulated time."""
     origin = moments[0][0]
     recorded = numpy.array([at - origin for at, _ in moments], dtype=numpy.float64)
     simulated = numpy.array([then for _, then in moments], dtype=numpy.float64)

@@ -30,13 +30,12 @@ def format_duration(duration_ns: float) -> str:
     sign, size = ("-", -whole) if whole < 0 else ("", whole)
     if size < 1_000:
         return f"{sign}{size} ns"
-    if size < 1_000_000:
-        return f"{sign}{size // 1_000}.{size % 1_000:03d} µs"
-    microseconds = (size + 500) // 1_000
-    if microseconds < 1_000_000:
-        return f"{sign}{microseconds // 1_000}.{microseconds % 1_000:03d} ms"
-    milliseconds = (size + 500_000) // 1_000_000
-    return f"{sign}{milliseconds // 1_000}.{milliseconds % 1_000:03d} s"
+    thousandths, unit = size, "µs"
+    if size >= 1_000_000:
+        thousandths, unit = (size + 500) // 1_000, "ms"
+    if thousandths >= 1_000_000:
+        thousandths, unit = (size + 500_000) // 1_000_000, "s"
+    return f"{sign}{thousandths // 1_000}.{thousandths % 1_000:03d} {unit}"
 
 
 def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False) -> str:

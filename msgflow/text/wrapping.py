@@ -35,6 +35,12 @@ def wrap(text: str, width: int) -> list[str]:
     return [*lines, line]
 
 
+def hanging(label: str, text: str, width: int) -> list[str]:
+    """Return lines of at most `width` cells: a label and a text, which stays on its right."""
+    first, *more = wrap(text, width - len(label))
+    return [label + first, *(" " * len(label) + line for line in more)]
+
+
 def wrap_path(path: str, width: int) -> list[str]:
     """Return a path in lines of at most `width` cells; a line that goes on begins with an arrow."""
     lines: list[str] = []

@@ -120,7 +120,7 @@ def test_its_name_is_completed(other: Path) -> None:
 def test_a_simulator_that_is_missing_is_named(
     msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("importlib.metadata.entry_points", lambda **_: ())
+    monkeypatch.setattr("msgflow.cli.app.entry_points", lambda **_: ())
     result = msgflow("simulate", "demo")
     assert result.exit_code == 2
     assert result.stderr == (

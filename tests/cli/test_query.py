@@ -8,9 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import Result
 
-from msgflow.cli.query_command import COMMON_OPTIONS
 from msgflow.query.catalogue import load_queries, load_query, query_names
-from msgflow.query.runner import RESERVED
 
 Msgflow = Callable[..., Result]
 
@@ -41,12 +39,6 @@ def test_help_tells_what_a_query_means_and_takes(msgflow: Msgflow, name: str) ->
         assert f"--{param.name.replace('_', '-')}" in words
     for column in header.columns:
         assert column.name in words
-
-
-def test_names_of_the_command_line_are_not_taken_by_queries() -> None:
-    for header in load_queries():
-        names = {param.name for param in header.params}
-        assert not names & (COMMON_OPTIONS | set(RESERVED))
 
 
 def test_show_prints_the_file_and_opens_nothing(msgflow: Msgflow) -> None:

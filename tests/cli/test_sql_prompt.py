@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from msgflow.cli.sql_prompt import completer, prompt
+from msgflow.cli.sql import completer, prompt
 from msgflow.errors import QueryError
 
 

@@ -18,7 +18,7 @@ import pytest
 from same_windows import by_path, require_equal, require_same_as_whole
 from thorough import few, thorough
 
-from msgflow.cli.show.window_line import window_line
+from msgflow.cli.show.watch_screen import window_line
 from msgflow.clocks.clocks_file import read_clock_sync
 from msgflow.database import Database
 from msgflow.errors import TraceError

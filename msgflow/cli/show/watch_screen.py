@@ -1,4 +1,4 @@
-"""The screen of `msgflow watch`: what is worst stands first, as in `top`."""
+"""What `msgflow watch` shows: a screen, the worst first as in `top`, or a line for each window."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from rich.table import Table
 from rich.text import Text
 
 from msgflow.cli.show.keys import noted_keys
-from msgflow.cli.show.window_line import verdict_words
 from msgflow.run.window import format_epoch
 from msgflow.text.values import NULL, count, format_duration, printable
 from msgflow.watch.alarm import violation_line
@@ -25,8 +24,9 @@ if TYPE_CHECKING:
 
 Row = dict[str, Any]
 
-# Of format_epoch: hours to seconds.
+# Of format_epoch: hours to seconds, and to milliseconds in a line for logs.
 _TIME = slice(11, 19)
+_TIME_OF_LINE = slice(11, 23)
 _SPARKS = "▁▂▃▄▅▆▇█"
 _STEPS = 10
 _THREADS, _TOPICS, _VIOLATIONS = 5, 5, 5
@@ -192,7 +192,7 @@ def _heading(report: WindowReport) -> Text:
     if report.lag_s is not None:
         text.append(f"   lag {report.lag_s:.1f} s", style="not bold")
     if report.verdicts:
-        text.append(f"   targets: {verdict_words(report)}", style="not bold")
+        text.append(f"   targets: {_verdict_words(report)}", style="not bold")
     lost = report.discarded_events
     said = f"{count(lost, 'event')} lost by the tracer"
     text.append(f"   {said}", style="red" if lost else "not bold dim")
@@ -279,3 +279,30 @@ def _short(text: str, width: int) -> Text:
         half = (width - 1) // 2
         text = f"{text[: width - 1 - half]}…{text[-half:]}"
     return Text(text)
+
+
+def window_line(report: WindowReport) -> str:
+    """Return what matters most in a window."""
+    start, end = (format_epoch(at)[_TIME_OF_LINE] for at in report.window.bindings.values())
+    roots = sum(path["roots"] for path in report.paths)
+    reached = sum(path["reached"] for path in report.paths)
+    words = [count(len(report.paths), "path"), f"{reached:,} of {roots:,} flows arrived"]
+    slow = max(report.paths, key=lambda path: path["max_ns"] or 0, default=None)
+    if slow is not None and slow["max_ns"] is not None:
+        words.append(f"slowest {format_duration(slow['max_ns'])} on {printable(slow['path'])}")
+    lost = sum(loss["dropped"] + loss["lost"] for loss in report.losses)
+    if lost:
+        words.append(f"{count(lost, 'message')} dropped or lost")
+    if report.discarded_events:
+        words.append(f"{count(report.discarded_events, 'event')} lost by the tracer")
+    if report.late_events:
+        words.append(f"{count(report.late_events, 'event')} came late")
+    if report.verdicts:
+        words.append(f"targets: {_verdict_words(report)}")
+    if report.lag_s is not None:
+        words.append(f"lag {report.lag_s:.1f} s")
+    return f"{start} to {end}: {', '.join(words)}"
+
+
+def _verdict_words(report: WindowReport) -> str:
+    return ", ".join(f"{number} {verdict}" for verdict, number in sorted(report.verdicts.items()))
