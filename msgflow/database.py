@@ -195,10 +195,16 @@ class Database:
 
         place = Path(directory).absolute()
         recorded = record(
-            place, name=place.name, channel=Channel(), program=program, seconds=seconds,
-            kernel=kernel, profile=None if profile is None else read_rate(profile), note=note,
+            place,
+            name=place.name,
+            channel=Channel(),
+            program=program,
+            seconds=seconds,
+            kernel=kernel,
+            profile=None if profile is None else read_rate(profile),
+            note=note,
             show=lambda status: None,
-        )  # fmt: skip
+        )
         if recorded.exit_code:
             note(f"{program[0]} ended with exit code {recorded.exit_code}")
         return self.ingest(place)
@@ -248,12 +254,19 @@ class Database:
         return ingest(
             [paths] if isinstance(paths, str | Path) else list(paths),
             self.path,
-            name=name, replace=replace, hosts=dict(hosts) if hosts else None,
+            name=name,
+            replace=replace,
+            hosts=dict(hosts) if hosts else None,
             keep_staging=Path(keep_staging) if keep_staging is not None else None,
             links=Path(links) if links is not None else None,
-            clock_sync=clock_sync, reader=reader, strict=strict, ignore=ignore, events=events,
-            memory_limit=self._memory_limit, progress=progress,
-        )  # fmt: skip
+            clock_sync=clock_sync,
+            reader=reader,
+            strict=strict,
+            ignore=ignore,
+            events=events,
+            memory_limit=self._memory_limit,
+            progress=progress,
+        )
 
     def apply_links(
         self, file: str | Path, *, run: str | int | None = None, content: str | None = None
@@ -589,9 +602,14 @@ class Database:
         from msgflow.view.flow_page import write_flow_page
 
         return self._ask(
-            write_flow_page, Path(path), flow.run, *flow.start_key, direction=flow.direction,
-            depth=flow.depth, limit=flow.limit,
-        )  # fmt: skip
+            write_flow_page,
+            Path(path),
+            flow.run,
+            *flow.start_key,
+            direction=flow.direction,
+            depth=flow.depth,
+            limit=flow.limit,
+        )
 
     def graph(self, *, internal: bool = False, **part: Unpack[SliceWords]) -> Graph:
         """Return the graph of nodes, topics, services and actions, for DOT, Mermaid or JSON.
@@ -663,11 +681,25 @@ class Database:
         from msgflow.query.compare import compare
 
         return self._ask(
-            compare, run_a, run_b, run=run, window=window, what=what, from_=from_, to=to, case=case,
-            explain=explain, at_least=at_least, skip_first=skip_first, confidence=confidence,
-            resamples=resamples, seed=seed, internal=internal, max_depth=max_depth,
+            compare,
+            run_a,
+            run_b,
+            run=run,
+            window=window,
+            what=what,
+            from_=from_,
+            to=to,
+            case=case,
+            explain=explain,
+            at_least=at_least,
+            skip_first=skip_first,
+            confidence=confidence,
+            resamples=resamples,
+            seed=seed,
+            internal=internal,
+            max_depth=max_depth,
             max_paths=max_paths,
-        )  # fmt: skip
+        )
 
     def verify(
         self,
@@ -762,9 +794,14 @@ class Database:
 
         found = None if targets is None else self.verify(targets, paths=paths, **part)
         return self._ask(
-            write_report, Path(output), Slice(**part), compare=compare, verification=found,
-            through=through, max_size=max_size,
-        )  # fmt: skip
+            write_report,
+            Path(output),
+            Slice(**part),
+            compare=compare,
+            verification=found,
+            through=through,
+            max_size=max_size,
+        )
 
     def sql(self, text: str, *, limit: int | None = DEFAULT_LIMIT) -> QueryResult:
         """Run SQL that only reads, without access to other files.

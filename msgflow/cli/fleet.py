@@ -88,14 +88,23 @@ def ingest(
     from msgflow.fleet.task import Options
 
     given: dict[str, Any] = {
-        "reader": reader, "strict": strict, "ignore": ignore or [], "events": events or [],
+        "reader": reader,
+        "strict": strict,
+        "ignore": ignore or [],
+        "events": events or [],
         "clock_sync": clock_sync,
-    }  # fmt: skip
+    }
     options = Options(
-        ingest=given, views=views, database=database, replace=replace, retry_failed=retry_failed,
-        tries=tries, timeout=seconds, memory=most,
+        ingest=given,
+        views=views,
+        database=database,
+        replace=replace,
+        retry_failed=retry_failed,
+        tries=tries,
+        timeout=seconds,
+        memory=most,
         scratch=None if scratch is None else str(scratch.absolute()),
-    )  # fmt: skip
+    )
     with fleet_progress(quiet) as progress:
         report = fleet_ingest(
             sources, lake, ray=ray, options=options, labels=labels, shard=part, progress=progress
@@ -341,9 +350,16 @@ def compare(
     from msgflow.fleet.compare import compare as compared
 
     comparison = compared(
-        _opened(lake), by, base, other, where=where, unit=unit, case=case, confidence=confidence,
+        _opened(lake),
+        by,
+        base,
+        other,
+        where=where,
+        unit=unit,
+        case=case,
+        confidence=confidence,
         at_least=at_least,
-    )  # fmt: skip
+    )
     print_comparison(comparison, fail_on or [], only_different, **shown)
 
 

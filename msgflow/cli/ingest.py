@@ -92,10 +92,19 @@ def command(
             reports = []
             for recording in recordings:
                 report = opened.ingest(
-                    recording.paths, name=name, replace=replace, hosts=recording.hosts,
-                    keep_staging=keep_staging, links=links, clock_sync=clock_sync, reader=reader,
-                    strict=strict, ignore=ignore or [], events=events or [], progress=progress,
-                )  # fmt: skip
+                    recording.paths,
+                    name=name,
+                    replace=replace,
+                    hosts=recording.hosts,
+                    keep_staging=keep_staging,
+                    links=links,
+                    clock_sync=clock_sync,
+                    reader=reader,
+                    strict=strict,
+                    ignore=ignore or [],
+                    events=events or [],
+                    progress=progress,
+                )
                 reports.append(report)
                 if not quiet:
                     _print_report(report, database)

@@ -93,11 +93,18 @@ def command(
     with _status_shown(beside_program=bool(program)) as show:
         every = (*EVENTS, *(events or []))
         recorded = record(
-            target.absolute(), name=name,
+            target.absolute(),
+            name=name,
             channel=Channel(every, subbuf_size, num_subbuf, without=full_names),
-            program=program or (), seconds=duration, kernel=kernel, snapshot=dual, python=python,
-            profile=None if profile is None else read_rate(profile), note=print_note, show=show,
-        )  # fmt: skip
+            program=program or (),
+            seconds=duration,
+            kernel=kernel,
+            snapshot=dual,
+            python=python,
+            profile=None if profile is None else read_rate(profile),
+            note=print_note,
+            show=show,
+        )
     print_status(f"recorded into {target}: {_words(recorded.last)}")
     if program and recorded.exit_code:
         print_note(f"{program[0]} ended with exit code {recorded.exit_code}")
@@ -105,9 +112,15 @@ def command(
     if ingest:
         # What is wrong is printed by check.
         ingest_command.command(
-            [str(target)], name=name, together=True, events=events or [], links=links,
-            clock_sync=clock_sync, quiet=True, database=database,
-        )  # fmt: skip
+            [str(target)],
+            name=name,
+            together=True,
+            events=events or [],
+            links=links,
+            clock_sync=clock_sync,
+            quiet=True,
+            database=database,
+        )
         print_status(f"read into {database} as run {name}")
         try:
             check.command(database=database)

@@ -25,9 +25,23 @@ FileOption = Annotated[Path | None, typer.Option("-f", "--file")]
 
 # Of the prompt: what it completes besides names, what ends it, what it says of itself.
 _WORDS = (
-    "SELECT", "FROM", "JOIN", "LEFT JOIN", "USING", "ON", "WHERE", "GROUP BY", "ORDER BY", "LIMIT",
-    "count(*)", "avg(", "min(", "max(", "quantile_disc(", "DESCRIBE",
-)  # fmt: skip
+    "SELECT",
+    "FROM",
+    "JOIN",
+    "LEFT JOIN",
+    "USING",
+    "ON",
+    "WHERE",
+    "GROUP BY",
+    "ORDER BY",
+    "LIMIT",
+    "count(*)",
+    "avg(",
+    "min(",
+    "max(",
+    "quantile_disc(",
+    "DESCRIBE",
+)
 _END = ("exit", "quit", ".exit", ".quit", ".q")
 _HELP = (
     "a query ends with ; or an empty line; tab completes names; .tables lists the views,"

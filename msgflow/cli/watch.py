@@ -142,17 +142,27 @@ def command(
         recorder = None
         if keep_on_violation is not None:
             recorder = FlightRecorder(
-                keep_on_violation.absolute(), most=keep_most, window_ns=window_ns,
-                earlier_ns=earlier_ns, clock_sync=clock_sync, note=print_note,
-            )  # fmt: skip
+                keep_on_violation.absolute(),
+                most=keep_most,
+                window_ns=window_ns,
+                earlier_ns=earlier_ns,
+                clock_sync=clock_sync,
+                note=print_note,
+            )
             stack.callback(recorder.close)
         watcher = Watcher(
-            window_ns=window_ns, step_ns=step_ns, late_ns=late_ns,
+            window_ns=window_ns,
+            step_ns=step_ns,
+            late_ns=late_ns,
             links=None if links is None else read_links(links),
             clocks=read_clock_sync(clock_sync),
-            note=print_note, alarm=alarm, recorder=recorder, exporter=exporter, database=database,
+            note=print_note,
+            alarm=alarm,
+            recorder=recorder,
+            exporter=exporter,
+            database=database,
             has_node=diagnostics,
-        )  # fmt: skip
+        )
         stack.callback(watcher.close)
         publisher = stack.enter_context(closing(Diagnostics())) if diagnostics else None
 
@@ -295,9 +305,14 @@ def _record(
 
         try:
             recorded = record(
-                target, name=name, channel=Channel(rotation_ns=step_ns), program=words, log=log,
-                note=print_note, show=show,
-            )  # fmt: skip
+                target,
+                name=name,
+                channel=Channel(rotation_ns=step_ns),
+                program=words,
+                log=log,
+                note=print_note,
+                show=show,
+            )
         finally:
             ended.set()
         watching.result()

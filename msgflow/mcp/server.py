@@ -212,10 +212,15 @@ class _Tools:
         one of the ids. direction: 'forward', 'backward' or 'both'.
         """
         flow = self._database.flow(
-            topic, at=at, publication_id=publication_id, take_id=take_id,
-            callback_instance_id=callback_instance_id, run=run, direction=direction,
+            topic,
+            at=at,
+            publication_id=publication_id,
+            take_id=take_id,
+            callback_instance_id=callback_instance_id,
+            run=run,
+            direction=direction,
             limit=_capped(limit),
-        )  # fmt: skip
+        )
         text = tree_text(flow)
         notes = [f"note: {note}" for note in flow.notes]
         if len(text) > MOST_CHARACTERS:
@@ -322,12 +327,15 @@ def _own(name: str, parameters: dict[str, Any]) -> dict[str, Any]:
 def _explained(header: Header) -> dict[str, Any]:
     parameters = [
         {
-            "name": param.name, "type": param.type, "default": param.default,
-            "required": not param.has_default, "choices": list(param.choices),
+            "name": param.name,
+            "type": param.type,
+            "default": param.default,
+            "required": not param.has_default,
+            "choices": list(param.choices),
             "description": param.description,
         }
         for param in header.params
-    ]  # fmt: skip
+    ]
     words = {word: getattr(header, word) for word in ("name", "title", "description", "grain")}
     return words | {"parameters": parameters, "columns": list(map(asdict, header.columns))}
 
