@@ -189,7 +189,7 @@ class Database:
             UsageError: there is no such program, or no such rate.
             TraceError: nothing of ROS 2 was recorded.
         """
-        from msgflow.record.profile import read_rate
+        from msgflow.record.perf import read_rate
         from msgflow.record.recording import record
         from msgflow.record.session import Channel
 
