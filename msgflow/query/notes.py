@@ -22,17 +22,8 @@ if TYPE_CHECKING:
     from msgflow.run.window import Window
     from msgflow.sql.value import Value
 
-# By the note of a header: what has rows where that was recorded, and what to say where it was not.
-_LACKING = {
-    "kernel": (
-        "thread_state",
-        "the kernel was not traced: msgflow record --kernel, see docs/scheduling.md",
-    ),
-    "samples": (
-        "stack_sample",
-        "no functions were sampled: msgflow record --profile 99, see docs/functions.md",
-    ),
-}
+# Notes of headers: a query with one of these has no rows where that was not recorded.
+_SOURCES = ("requests", "goals", "kernel", "samples")
 # How many values of a row pass such a link, or whether its flow does.
 AMBIGUOUS = "ambiguous"
 _MARKS = (AMBIGUOUS, "is_ambiguous")
@@ -80,10 +71,10 @@ def empty_notes(
     selection: Selection,
 ) -> list[str]:
     """Return why a query whose header has this note has no rows."""
-    untraced = _not_traced(connection, runs, note)
+    unrecorded = _unrecorded(connection, runs, note) if note in _SOURCES else []
     narrowing = _narrowing(parameters, selection)
-    if untraced or not narrowing:
-        return untraced
+    if unrecorded or not narrowing:
+        return unrecorded
     why = _missing_way(connection, runs, parameters) or "try with less"
     return [f"nothing fits {' '.join(narrowing)}: {why}"]
 
@@ -97,48 +88,15 @@ def row_notes(
         notes += clock_notes(connection, runs)
         notes += _untraced_notes(connection, runs, table)
     if note == "callbacks":
-        notes += _without_callbacks(connection, runs)
+        notes += _unrecorded(connection, runs, note)
     return notes
 
 
-def _not_traced(
+def _unrecorded(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], note: str | None
 ) -> list[str]:
-    """Return notes on missing events, if the rows would have come from them."""
-    if note in {"requests", "goals"}:
-        # Other events of a run may show that this layer was not traced.
-        rows = connection.execute(
-            "SELECT run_id, detail FROM main.finding WHERE list_contains($runs, run_id) "
-            "AND name = 'missing_layer' AND subject = $layer ORDER BY run_id",
-            {"runs": [run.run_id for run in runs], "layer": note},
-        ).fetchall()
-        titles = {run.run_id: "" if len(runs) == 1 else f"run {run.title}: " for run in runs}
-        return [f"{titles[run_id]}{detail}" for run_id, detail in rows]
-    if note not in _LACKING:
-        return []
-    view, lacking = _LACKING[note]
-    found = connection.execute(
-        f"SELECT 1 FROM main.{view} WHERE list_contains(?, run_id) LIMIT 1",
-        [[run.run_id for run in runs]],
-    )
-    return [] if found.fetchall() else [lacking]
-
-
-def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
-    """Return a note that names processes without known callbacks, if there are any."""
-    rows = connection.execute(
-        "SELECT DISTINCT subject FROM main.finding "
-        "WHERE list_contains($runs, run_id) AND name = 'process_without_rclcpp' ORDER BY subject",
-        {"runs": [run.run_id for run in runs]},
-    ).fetchall()
-    if not rows:
-        return []
-    names = ", ".join(subject for (subject,) in rows)
-    what = "process records" if len(rows) == 1 else "processes record"
-    return [
-        f"{len(rows)} {what} no callbacks, without rclcpp (as those of rclpy): {names};"
-        " msgflow query path-breakdown has their times from take to publication"
-    ]
+    chosen = {"runs": [run.run_id for run in runs], "note": note}
+    return _sentences(connection, "unrecorded", chosen)
 
 
 def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[str]:
