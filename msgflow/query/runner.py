@@ -39,15 +39,7 @@ if TYPE_CHECKING:
 RESERVED = ("runs", "start_ns", "end_ns", *RECORDED)
 _COLUMN = re.compile(r'Referenced column "([^"]*)"')
 # Errors that a user's condition may cause: the queries themselves are tested.
-_OF_CONDITIONS = (
-    duckdb.BinderException,
-    duckdb.CatalogException,
-    duckdb.PermissionException,
-    duckdb.ParserException,
-    duckdb.ConversionException,
-    duckdb.OutOfRangeException,
-    duckdb.InvalidInputException,
-)
+_OF_CONDITIONS = (duckdb.ProgrammingError, duckdb.DataError, duckdb.PermissionException)
 
 
 class Steps:

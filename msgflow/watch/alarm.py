@@ -100,9 +100,11 @@ class Alarm:
         failing = {}
         culprits: list[Row] | None = None
         for row in rows:
-            self._remember(row)
+            verdict = Verdict(row["verdict"])
+            before = self._verdicts.get(_key(row), verdict)
+            self._verdicts[_key(row)] = min(before, verdict, key=_STRONGEST.index)
             row |= dict.fromkeys(_CAUSES) | {"flows": self._flows(con, row, part)}
-            if row["verdict"] != Verdict.FAILED:
+            if verdict != Verdict.FAILED:
                 continue
             key = tuple(row[name] for name in ("target", "metric", "condition", "subject", "path"))
             told = self._failing.get(key)
@@ -135,11 +137,6 @@ class Alarm:
                 numbers = {name: each[f"{prefix}{name}"] for name in ("median_ns", "p99_ns")}
                 return numbers | {name: each[name] for name in ("lost", "dropped")}
         return None
-
-    def _remember(self, row: Row) -> None:
-        key, verdict = _key(row), Verdict(row["verdict"])
-        before = self._verdicts.get(key, verdict)
-        self._verdicts[key] = min(before, verdict, key=_STRONGEST.index)
 
     def _note_silence(self, rows: Sequence[Row]) -> None:
         """Say what had data before and has none in this window, once for each silence."""
