@@ -97,9 +97,6 @@ class _Writer:
         flags = self.types.TracePacket.SEQ_NEEDS_INCREMENTAL_STATE
         self.write(timestamp=time_ns, sequence_flags=flags, **fields)
 
-    def track(self, number: int, parent: int | None = None, **what: Any) -> None:
-        self.write(track_descriptor={"uuid": number, "parent_uuid": parent, **what})
-
     def event(self, time_ns: int, track: int, kind: str, **what: Any) -> None:
         event = {"type": f"TYPE_{kind}", "track_uuid": track, **what}
         self.write_at(time_ns, track_event=event)
@@ -141,7 +138,8 @@ class _Writer:
         for row in self.rows(query):
             if row["track"] != known:
                 known = row["track"]
-                self.track(known, row.get("parent"), name=row["track_name"])
+                track = {"parent_uuid": row.get("parent"), "name": row["track_name"]}
+                self.write(track_descriptor={"uuid": known, **track})
             said = {name: row[column] for name, column in noted.items()}
             self.event(
                 row["start_ns"], row["track"], "SLICE_BEGIN",

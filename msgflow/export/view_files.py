@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from msgflow.db.objects import public_names
 from msgflow.errors import UsageError
@@ -172,22 +172,16 @@ def _pandas_types(schema: pa.Schema) -> str:
     """Return metadata for pandas: nullable types for integers and truth values."""
     import pyarrow
 
-    columns: list[dict[str, Any]] = []
-    for field in schema:
-        name = str(field.type)
-        if pyarrow.types.is_boolean(field.type):
-            types = ("bool", "boolean")
-        elif pyarrow.types.is_integer(field.type):
-            types = (name, f"{'UInt' if name.startswith('u') else 'Int'}{field.type.bit_width}")
-        else:
-            continue
-        columns.append(
-            {
-                "name": field.name,
-                "field_name": field.name,
-                "pandas_type": types[0],
-                "numpy_type": types[1],
-                "metadata": None,
-            }
-        )
+    # int64 becomes Int64, uint8 becomes UInt8.
+    columns = [
+        {
+            "name": field.name,
+            "field_name": field.name,
+            "pandas_type": name,
+            "numpy_type": name.replace("int", "Int").replace("u", "U").replace("bool", "boolean"),
+            "metadata": None,
+        }
+        for field, name in ((field, str(field.type)) for field in schema)
+        if pyarrow.types.is_integer(field.type) or name == "bool"
+    ]
     return json.dumps({"columns": columns, "index_columns": [], "column_indexes": []})

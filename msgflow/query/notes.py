@@ -7,6 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+import pyarrow.compute as pc
+
 from msgflow.query.selection import KINDS
 from msgflow.run.window import format_epoch
 from msgflow.sql.statement import internal_sql, registered
@@ -14,7 +17,6 @@ from msgflow.text.values import ARROW, format_duration
 
 if TYPE_CHECKING:
     import duckdb
-    import pyarrow as pa
 
     from msgflow.query.selection import Selection
     from msgflow.result.query_result import QueryResult
@@ -29,12 +31,6 @@ AMBIGUOUS = "ambiguous"
 _MARKS = (AMBIGUOUS, "is_ambiguous")
 # What has the nodes: a path, or in a verification what was measured.
 _WAYS = ("path", "subject")
-_FOUND = """
-SELECT subject, detail, cure
-FROM main.finding
-WHERE list_contains($runs, run_id) AND name IN ('ambiguous_cause', 'ambiguous_link')
-ORDER BY name, run_id, subject
-"""
 _MOST = 3
 _SAMPLED = "SELECT count(DISTINCT run_id) FROM main.stack_sample WHERE run_id IN ($run_a, $run_b)"
 _ASKED = ("run_a", "run_b", "skip_first", "a_window", "b_window")
@@ -144,21 +140,8 @@ def _untraced_notes(
     """Return where flows begin whose first publisher is not traced, if paths have any."""
     if "path" not in table.column_names:
         return []
-    chosen = {"runs": [run.run_id for run in runs]}
-    begins = internal_sql().run(connection, "untraced_begin", chosen).fetchall()
-    if not begins:
-        return []
-    paths = [path for path in table["path"].unique().to_pylist() if path is not None]
-    where = {
-        True: "the stamp of each message",
-        False: "its take: its clock may be another one",
-        None: "the stamp of each message, or its take where its clock may be another one",
-    }
-    return [
-        f"what publishes {topic} is not traced: flows begin with {where[is_stamped]}"
-        for topic, is_stamped in begins
-        if any(path.startswith(f"(not traced) → {topic} → ") for path in paths)
-    ]
+    with registered(connection, noted=table.select(["path"])):
+        return _sentences(connection, "untraced_note", {"runs": [run.run_id for run in runs]})
 
 
 def clock_verdicts(
@@ -186,19 +169,12 @@ def doubt_notes(
     )
     if mark is None or way is None:
         return []
-    with registered(connection, doubtful=table):
-        doubted = connection.execute(
-            f"SELECT DISTINCT {way} FROM doubtful WHERE {mark}::BOOLEAN"
-        ).fetchall()
-    if not doubted:
+    noted = pa.table({"way": table[way], "mark": table[mark].cast(pa.bool_())})
+    # Most results need no note: this takes no time.
+    if not pc.any(noted["mark"]).as_py():
         return []
-    places = {step for (steps,) in doubted if steps is not None for step in steps.split(" → ")}
-    found = connection.execute(_FOUND, {"runs": [run.run_id for run in runs]}).fetchall()
-    return [
-        f"{subject}: {detail}, and flows through it with them. {cure.rstrip('.')}"
-        for subject, detail, cure in found
-        if subject in places
-    ] or ["some flows pass a link that may be another one: candidate_count of the links"]
+    with registered(connection, noted=noted):
+        return _sentences(connection, "doubt_note", {"runs": [run.run_id for run in runs]})
 
 
 def schedule_notes(

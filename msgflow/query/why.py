@@ -173,7 +173,7 @@ def _explained(
     path = _worst(verdict, paths)
     places = path.split(" → ")
     flow = ask("critical-path", **ends, via=[path], quantile="p95")
-    parts = _rows(connection, "FROM result WHERE path = $path", parts, path=path)
+    parts = _rows(connection, "FROM result WHERE path = $path", parts, "result", path=path)
     callbacks = [[row["node"], row["what"]] for row in parts.table.to_pylist()]
     # What is said of paths that end at a node which publishes.
     ends_of = [each.split(" → ")[-2:] for each in ([path] if place is None else shown)]
@@ -184,15 +184,16 @@ def _explained(
         if any(node == last and f" on {topic} " in detail for topic, last in ends_of)
     )
     ends_here = list(dict.fromkeys(said))
-    waits = _rows(connection, _OWN_WAITS, waits, callbacks=callbacks)
-    losses = _rows(connection, _OWN_LOSSES, losses, places=places)
-    paths = _rows(connection, _WORST_FIRST, paths, path=path)
+    waits = _rows(connection, _OWN_WAITS, waits, "result", callbacks=callbacks)
+    losses = _rows(connection, _OWN_LOSSES, losses, "result", places=places)
+    paths = _rows(connection, _WORST_FIRST, paths, "result", path=path)
+    internal = internal_sql()
     asked_for = {
         "has_unknown": bool(ends_here) or _UNNAMED in places,
         "since": ["--start", f"{skipped:g}s"] if skipped else [],
     }
     with registered(connection, piece=flow.table, loss=losses.table):
-        steps = internal_sql().run(connection, "next_command", asked_for).fetchall()
+        steps = internal.run(connection, "next_command", asked_for).fetchall()
     sentences = " ".join(verdict["sentence"].to_pylist())
     notes = [cure for unknown, cure in _UNKNOWN.items() if unknown in sentences]
     if skipped:
@@ -207,8 +208,10 @@ def _explained(
         place=place,
         verdict=replace(paths, table=verdict, header=None, notes=[], path_numbers={}),
         paths=paths,
-        nodes=_derived(connection, "node_share", "breakdown", parts, path=path),
-        slow_flow=_derived(connection, "longest_piece", "slow_flow", flow, count=_PIECES),
+        nodes=_rows(connection, internal.text("node_share"), parts, "breakdown", path=path),
+        slow_flow=_rows(
+            connection, internal.text("longest_piece"), flow, "slow_flow", count=_PIECES
+        ),
         waits=waits,
         losses=losses,
         steps=tuple(tuple(words) for (words,) in steps),
@@ -258,20 +261,11 @@ def _nothing(ask: Ask, place: str | None) -> NoFlowError:
 
 
 def _rows(
-    connection: duckdb.DuckDBPyConnection, sql: str, of: QueryResult, **values: Any
+    connection: duckdb.DuckDBPyConnection, sql: str, of: QueryResult, name: str, **values: Any
 ) -> QueryResult:
-    """Return a result with the rows of a query on it, which it calls `result`."""
-    with registered(connection, result=of.table):
+    """Return a result with the rows of a query on it, which reads it by this name."""
+    with registered(connection, **{name: of.table}):
         return replace(of, table=connection.sql(sql, params=values).to_arrow_table())
-
-
-def _derived(
-    connection: duckdb.DuckDBPyConnection, name: str, rows: str, of: QueryResult, **values: Value
-) -> QueryResult:
-    """Return what a statement makes of a result, whose rows it reads by this name."""
-    with registered(connection, **{rows: of.table}):
-        found = internal_sql().run(connection, name, values)
-        return replace(of, table=found.to_arrow_table())
 
 
 def with_functions(

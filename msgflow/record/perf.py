@@ -48,7 +48,6 @@ SCHEDULER_OPTIONS = (
     "--mmap-pages=8192",
     *(f"--event={name}" for name in _KERNEL_NAMES.values()),
 )
-_TRACE = "perf"
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +157,7 @@ def recorded_with_perf(directory: Path, note: Callable[[str], None]) -> Iterator
     data = directory / "perf.scheduler"
     with recorded(data, SCHEDULER_OPTIONS, note):
         yield
-    trace = directory / _TRACE
+    trace = directory / "perf"
     convert = ["perf", "data", "convert", f"--to-ctf={trace}", f"--input={data}"]
     run = subprocess.run(convert, capture_output=True, text=True, start_new_session=True)
     if run.returncode:

@@ -43,11 +43,6 @@ class _Told:
     until_ns: int  # until when all was judged
     causes: Row  # those that were told of it
 
-    @classmethod
-    def of(cls, row: Row, until_ns: int, before: _Told | None) -> _Told:
-        worst_ns = max(row["worst_ns"] or 0, 0 if before is None else before.worst_ns)
-        return cls(worst_ns, until_ns, {name: row[name] for name in _CAUSES})
-
     def is_surpassed(self, worst_ns: int | None, at_ns: int | None) -> bool:
         is_later = at_ns is not None and at_ns >= self.until_ns
         return is_later or (worst_ns or 0) > self.worst_ns
@@ -115,7 +110,8 @@ class Alarm:
                 row |= {name: found[-1][name] for name in _CAUSES}
             else:
                 row |= told.causes
-            failing[key] = _Told.of(row, window.end_ns, told)
+            worst_ns = max(row["worst_ns"] or 0, 0 if told is None else told.worst_ns)
+            failing[key] = _Told(worst_ns, window.end_ns, {name: row[name] for name in _CAUSES})
         self._failing = failing
         self._note_silence(rows)
         return found, rows

@@ -10,7 +10,7 @@ from typer.testing import Result
 
 from msgflow.cli.query_command import COMMON_OPTIONS
 from msgflow.query.catalogue import load_queries, load_query, query_names
-from msgflow.query.runner import RESERVED
+from msgflow.sql.statement import RECORDED
 
 Msgflow = Callable[..., Result]
 
@@ -46,7 +46,7 @@ def test_help_tells_what_a_query_means_and_takes(msgflow: Msgflow, name: str) ->
 def test_names_of_the_command_line_are_not_taken_by_queries() -> None:
     for header in load_queries():
         names = {param.name for param in header.params}
-        assert not names & (COMMON_OPTIONS | set(RESERVED))
+        assert not names & (COMMON_OPTIONS | {"runs", "start_ns", "end_ns", *RECORDED})
 
 
 def test_show_prints_the_file_and_opens_nothing(msgflow: Msgflow) -> None:

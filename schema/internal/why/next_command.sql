@@ -42,10 +42,10 @@ command AS (
         4,
         ['query', 'topics', '--measure', 'unmatched'] || CASE
             WHEN count(*) = count(topic_name)
-                THEN flatten(list(DISTINCT ['--topic', topic_name] ORDER BY ['--topic', topic_name]))
+                THEN flatten(list(['--topic', topic_name] ORDER BY topic_name))
             ELSE []
         END
-    FROM loss
+    FROM (SELECT DISTINCT topic_name FROM loss)
     HAVING count(*) > 0
 )
 SELECT words
