@@ -22,7 +22,9 @@ from msgflow.errors import UsageError
 _PATIENCE = ((signal.SIGINT, 10.0), (signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))
 _BETWEEN_LOOKS = 0.05
 PYTHON_NODES = Path(__file__).resolve().with_name("python_nodes")
-"""The folder; Python runs its `sitecustomize` when it starts."""
+"""The folder of what traces nodes of rclpy; Python runs its `sitecustomize` when it starts."""
+
+# The exit code of a Python whose functions have no names for perf.
 _TOO_OLD = 12
 # `python3.12`, and no program whose name only begins so: it is executed to learn its version.
 _PYTHON = re.compile(r"(^|/)python[\d.]*$")
