@@ -1,5 +1,5 @@
--- description: Where flows begin whose first publisher is not traced, a sentence for each topic with
---     which paths of a result (`noted`) begin so.
+-- description: Where flows begin whose first publisher is not traced, a sentence for each topic
+--     with which paths of a result (`noted`) begin so.
 -- grain: one row per topic
 SELECT
     format(
