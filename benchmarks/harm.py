@@ -26,7 +26,7 @@ from pathlib import Path
 from recording.recorder import require, ros_environment, session
 from recording.tracetools import build_tracetools
 
-from msgflow.record.python_path import PYTHON_NODES
+from msgflow.record.program import PYTHON_NODES
 
 _ROBOT = Path(__file__).parent / "recording" / "ten.py"
 _TRACER = "_msgflow_rclpy.py"

@@ -36,8 +36,8 @@ from recording.tracetools import build_tracetools
 from msgflow import trace
 from msgflow.record import perf
 from msgflow.record.daemon import session_daemon
-from msgflow.record.profile import Rate, recorded_samples
-from msgflow.record.python_path import PYTHON_NODES
+from msgflow.record.perf import Rate, recorded_samples
+from msgflow.record.program import PYTHON_NODES
 from msgflow.record.recording import recorded_bytes
 from msgflow.record.session import Channel, can_trace_kernel, recording_session
 

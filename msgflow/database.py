@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from msgflow.export.mcap import ExportedMcap
     from msgflow.export.otlp import ExportedTraces
     from msgflow.export.perfetto import PerfettoTrace
-    from msgflow.export.views import ExportedView
+    from msgflow.export.view_files import ExportedView
     from msgflow.ingest import IngestProgress, IngestReport
     from msgflow.links.annotations import AppliedLinks
     from msgflow.links.suggested_links import LinkSuggestions
@@ -189,7 +189,7 @@ class Database:
             UsageError: there is no such program, or no such rate.
             TraceError: nothing of ROS 2 was recorded.
         """
-        from msgflow.record.profile import read_rate
+        from msgflow.record.perf import read_rate
         from msgflow.record.recording import record
         from msgflow.record.session import Channel
 
@@ -347,8 +347,7 @@ class Database:
                 rosbags is not installed.
             TraceError: not a bag, a damaged one, or one that takes too much memory.
         """
-        from msgflow.bag.join import join_bag
-        from msgflow.bag.messages import read_bag
+        from msgflow.bag.messages import join_bag, read_bag
 
         # The database is opened for a bag that can be read.
         with read_bag(Path(bag), memory_limit=self._memory_limit) as messages:
@@ -956,7 +955,7 @@ class Database:
         part: Slice,
         force: bool,
     ) -> tuple[ExportedView, ...]:
-        from msgflow.export.views import select_views
+        from msgflow.export.view_files import select_views
 
         selection = self._ask(select_views, views, part)
         return self._ask(write, Path(output), selection, force=force)

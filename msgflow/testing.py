@@ -25,7 +25,7 @@ import pytest
 
 from msgflow.database import Database
 from msgflow.record.daemon import session_daemon
-from msgflow.record.python_path import with_python_nodes
+from msgflow.record.program import with_python_nodes
 from msgflow.record.session import Channel, recording_session
 
 __all__ = ["Latency", "RecordedDatabase", "ms", "msgflow_recorded", "recorded"]

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from msgflow import trace
 from msgflow.record.daemon import session_daemon
-from msgflow.record.python_path import PYTHON_NODES
+from msgflow.record.program import PYTHON_NODES
 from msgflow.record.session import Channel, recording_session
 from recording.tracetools import build_tracetools
 

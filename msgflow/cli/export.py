@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from msgflow.export.mcap import ExportedMcap
     from msgflow.export.otlp import ExportedTraces
     from msgflow.export.perfetto import PerfettoTrace
-    from msgflow.export.views import ExportedView
+    from msgflow.export.view_files import ExportedView
 
 app = typer.Typer()
 

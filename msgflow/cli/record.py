@@ -71,8 +71,8 @@ def command(
     from msgflow.clocks.clocks_file import read_clock_sync
     from msgflow.database import Database
     from msgflow.links.links_file import read_links
-    from msgflow.record.profile import read_rate
-    from msgflow.record.python_path import PYTHON_NODES
+    from msgflow.record.perf import read_rate
+    from msgflow.record.program import PYTHON_NODES
     from msgflow.record.recording import record
     from msgflow.record.session import EVENTS, Channel
 

@@ -66,7 +66,7 @@ def screen_sections(
 
 
 def _whole_sections(results: Mapping[str, QueryResult], form: SectionsFormat) -> Iterator[str]:
-    from msgflow.export.table import markdown_lines, table_lines
+    from msgflow.export.formats import markdown_lines, table_lines
 
     for position, (section, result) in enumerate(results.items()):
         if position:

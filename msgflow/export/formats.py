@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
-from itertools import chain, pairwise
+from itertools import chain, pairwise, repeat
+from operator import add
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeVar
 
 from msgflow.errors import UsageError
+from msgflow.result.rows import cells
 from msgflow.text.json_value import json_text, json_value
+from msgflow.text.markdown import markdown_line, rule_line
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
 
 _ROWS_AT_ONCE = 10_000
+_GAP = "  "
 Form = TypeVar("Form")
 
 
@@ -75,8 +79,6 @@ def write_result(result: QueryResult, form: Format, stream: IO[bytes]) -> None:
 
         pyarrow.parquet.write_table(result.table, stream, compression="zstd")
     else:
-        from msgflow.export.table import markdown_lines, table_lines
-
         writers = {
             Format.TABLE: table_lines,
             Format.MARKDOWN: markdown_lines,
@@ -85,6 +87,43 @@ def write_result(result: QueryResult, form: Format, stream: IO[bytes]) -> None:
         }
         for line in writers[form](result):
             stream.write(f"{line}\n".encode())
+
+
+def table_lines(result: QueryResult) -> Iterator[str]:
+    """Yield the lines of a table: names, a rule, one line per row, numbers to the right."""
+    names, columns, right = cells(result)
+    if not names:
+        return
+    padded, widths = zip(*map(_aligned, names, columns, right), strict=True)
+    lines = (_GAP.join(row).rstrip() for row in zip(*padded, strict=True))
+    yield next(lines)
+    yield "─" * (sum(widths) + len(_GAP) * (len(widths) - 1))
+    yield from lines
+
+
+def markdown_lines(result: QueryResult) -> Iterator[str]:
+    """Yield the lines of a Markdown table."""
+    names, columns, right = cells(result)
+    if not names:
+        return
+    yield markdown_line(names)
+    yield rule_line(right)
+    for row in zip(*columns, strict=True):
+        yield markdown_line(row)
+
+
+def _aligned(name: str, column: Sequence[str], is_right: bool) -> tuple[Iterator[str], int]:
+    """Return the title and cells of a column padded to one width, and that width."""
+    from rich.cells import cell_len
+
+    texts = [name, *column]
+    characters = "".join(texts)
+    if characters.isascii() or all(cell_len(character) == 1 for character in set(characters)):
+        width = max(map(len, texts))
+        return map(str.rjust if is_right else str.ljust, texts, repeat(width)), width
+    width = max(map(cell_len, texts))
+    padding = (" " * (width - cell_len(text)) for text in texts)
+    return map(add, *((padding, texts) if is_right else (texts, padding))), width
 
 
 def json_rows(result: QueryResult) -> Iterator[str]:

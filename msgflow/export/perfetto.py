@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,22 +20,7 @@ if TYPE_CHECKING:
     from msgflow.run.slice import Slice
 
 _SEQUENCE = 1
-# Ids of things, by the code of the Perfetto slice.
-_IDENTITIES = (
-    "callback_instance_id",
-    "publication_id",
-    "take_id",
-    "request_id",
-    "request_id",
-    "response_id",
-    "response_id",
-    "executor_id",
-)
 _LARGEST_INTEGER = 2**63 - 1
-_SYMBOL = len(_IDENTITIES) + 1
-_NUMBERS = ("candidate_count", "queue_ns", "served_ns")
-_KINDS = ("SLICE_END", "SLICE_BEGIN", "INSTANT")  # by the rank of a row
-_CATEGORIES = ("callback", "publication", "take", *["service"] * 4, "executor")
 
 
 @dataclass(frozen=True)
@@ -112,9 +97,6 @@ class _Writer:
         flags = self.types.TracePacket.SEQ_NEEDS_INCREMENTAL_STATE
         self.write(timestamp=time_ns, sequence_flags=flags, **fields)
 
-    def track(self, number: int, parent: int | None = None, **what: Any) -> None:
-        self.write(track_descriptor={"uuid": number, "parent_uuid": parent, **what})
-
     def event(self, time_ns: int, track: int, kind: str, **what: Any) -> None:
         event = {"type": f"TYPE_{kind}", "track_uuid": track, **what}
         self.write_at(time_ns, track_event=event)
@@ -127,55 +109,20 @@ class _Writer:
         start_ns = self.run.start_ns or 0
         clocks = [{"clock_id": number, "timestamp": start_ns} for number in numbers]
         self.write(clock_snapshot={"clocks": clocks})
-        for row in self.rows("perfetto_process"):
-            self.track(row["track"], process={"pid": row["pid"], "process_name": row["name"]})
-        for row in self.rows("perfetto_thread"):
-            thread = {"pid": row["pid"], "tid": row["tid"], "thread_name": row["name"]}
-            self.track(row["track"], row["parent"], thread=thread)
-            if row["has_states"]:
-                self.track(row["state_track"], row["track"], name="executor")
-        for row in self.rows("perfetto_counter"):
-            counter = {"unit_name": row["unit"]}
-            self.track(row["track"], row["parent"], name=row["name"], counter=counter)
-        symbols = [
-            {"iid": row["id"], "str": row["name"].encode()} for row in self.rows("perfetto_symbol")
-        ]
-        names = {
-            "debug_annotation_names": _numbered((*_IDENTITIES, "symbol", *_NUMBERS)),
-            "event_categories": _numbered(_CATEGORIES),
-            "event_names": [
-                {"iid": row["id"] * 8 + row["code"] + 1, "name": row["name"]}
-                for row in self.rows("perfetto_name")
-            ],
-            "debug_annotation_string_values": symbols,
-        }
+        for row in self.rows("perfetto_track"):
+            self.write(**row)
         flags = self.types.TracePacket.SEQ_INCREMENTAL_STATE_CLEARED
-        self.write(sequence_flags=flags, interned_data=names)
+        for row in self.rows("perfetto_interned_name"):
+            self.write(sequence_flags=flags, **row)
 
     def slices(self) -> tuple[int, int]:
         """Return how many slices were written, and how many arrows begin at them."""
         slices = arrows = 0
-        for row in self.rows("perfetto_slice"):
-            what: dict[str, Any] = {}
-            if row["rank"]:
-                notes = [{"name_iid": row["code"] + 1, "int_value": row["id"]}]
-                if row["symbol_id"] is not None:
-                    notes.append({"name_iid": _SYMBOL, "string_value_iid": row["symbol_id"]})
-                notes += [
-                    {"name_iid": number, "int_value": row[name]}
-                    for number, name in enumerate(_NUMBERS, start=_SYMBOL + 1)
-                    if row[name] is not None
-                ]
-                what = {
-                    "name_iid": row["name"],
-                    "category_iids": [row["code"] + 1],
-                    "debug_annotations": notes,
-                    "flow_ids": row["outgoing"],
-                    "terminating_flow_ids": row["incoming"],
-                }
-                slices += 1
-                arrows += len(row["outgoing"] or ())
-            self.event(row["at_ns"], row["track"], _KINDS[row["rank"]], **what)
+        for row in self.rows("perfetto_slice_event"):
+            event = row["track_event"]
+            self.write_at(row["at_ns"], track_event=event)
+            slices += event["type"] != "TYPE_SLICE_END"
+            arrows += len(event["flow_ids"] or ())
         return slices, arrows
 
     def values(self) -> int:
@@ -191,7 +138,8 @@ class _Writer:
         for row in self.rows(query):
             if row["track"] != known:
                 known = row["track"]
-                self.track(known, row.get("parent"), name=row["track_name"])
+                track = {"parent_uuid": row.get("parent"), "name": row["track_name"]}
+                self.write(track_descriptor={"uuid": known, **track})
             said = {name: row[column] for name, column in noted.items()}
             self.event(
                 row["start_ns"], row["track"], "SLICE_BEGIN",
@@ -215,36 +163,16 @@ class _Writer:
 
     def samples(self) -> int:
         """Write samples of stacks, each stack and function once; return how many samples."""
-        frames = list(self.rows("perfetto_frame"))
-        if not frames:
-            return 0
-        files = [row for row in frames if row["id"] == row["file_id"]]
-        interned = {
-            "mapping_paths": [{"iid": row["id"], "str": row["file"].encode()} for row in files],
-            "mappings": [{"iid": row["id"], "path_string_ids": [row["id"]]} for row in files],
-            "function_names": [{"iid": row["id"], "str": row["name"].encode()} for row in frames],
-            "frames": [
-                {"iid": row["id"], "function_name_id": row["id"], "mapping_id": row["file_id"]}
-                for row in frames
-            ],
-            "callstacks": [
-                {"iid": row["stack_id"], "frame_ids": row["frames"]}
-                for row in self.rows("perfetto_stack")
-            ],
-        }
         timebase = {"counter": self.types.PerfEvents.Counter.SW_CPU_CLOCK}
         defaults = {"perf_sample_defaults": {"timebase": timebase}}
-        self.write(trace_packet_defaults=defaults, interned_data=interned)
+        for row in self.rows("perfetto_interned_stack"):
+            self.write(trace_packet_defaults=defaults, **row)
         count = 0
         for row in self.rows("perfetto_sample"):
             sample = {name: row[name] for name in ("cpu", "pid", "tid")}
             self.write_at(row["at_ns"], perf_sample={**sample, "callstack_iid": row["stack_id"]})
             count += 1
         return count
-
-
-def _numbered(names: Sequence[str]) -> list[dict[str, Any]]:
-    return [{"iid": number, "name": name} for number, name in enumerate(names, start=1)]
 
 
 def _note(name: str, value: Any) -> dict[str, Any]:

@@ -5,10 +5,12 @@ A query may have variants, each in a file of its own: an option chooses one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+import tomllib
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
@@ -22,42 +24,17 @@ if TYPE_CHECKING:
 
 COMMANDS = ("clocks", "graph", "info", "links")
 """Queries that have a command of their own: `msgflow clocks`, not `msgflow query clocks`."""
-# Words that people use for a query, without the s of a plural, and what it was called.
-_WORDS = {
-    "timers": "jitter period timer lateness",
-    "topics-rate": "jitter rate frequency hz period",
-    "scheduling-preemption": "preemption",
-    "waits-pair": "blocking blocked interference preemption",
-    "waits": "blocked queue waiting",
-    "topics-delivery": "drop dropped los lost delivery queue",
-    "topics-unmatched": "lost",
-    "info-quality": "los",
-    "e2e-latency": "latency latencie end-to-end path",
-    "critical-path": "slow slowest bottleneck",
-    "flows": "slow slowest",
-    "topics-latency": "latency latencie dd network transport",
-    "path-breakdown": "path bottleneck dd network",
-    "service-latency": "latency latencie service",
-    "action-latency": "latency latencie action goal",
-    "executor-usage": "cpu utilisation utilization load",
-    "callbacks": "duration runtime wcet",
-    "e2e-latency-age": "age freshnes",
-    "e2e-latency-reaction": "reaction",
-    "info-nodes": "node",
-    "info-hosts": "host",
-    "info": "run",
-    "info-processes": "proces",
-    "info-findings": "diagnostic",
-    "scheduling": "callback-schedule",
-    "scheduling-threads": "thread-state",
-    "scheduling-cpu": "cpu-usage",
-    "scheduling-wakeup": "wakeup-latency",
-}
-QUERIES_BY_WORD = {
-    word: tuple(name for name, words in _WORDS.items() if word in words.split())
-    for word in " ".join(_WORDS.values()).split()
-}
-"""Words that people use, and the queries that answer them."""
+
+
+@cache
+def queries_by_word() -> Mapping[str, Sequence[str]]:
+    """Return the words that people use, and the queries that answer them."""
+    found: dict[str, list[str]] = {}
+    text = Path(__file__).with_name("words.toml").read_text(encoding="utf-8")
+    for name, words in tomllib.loads(text).items():
+        for word in words.split():
+            found.setdefault(word, []).append(name)
+    return found
 
 
 @cache
@@ -131,7 +108,7 @@ def _header(name: str) -> Header:
 def queries_meant(word: str) -> tuple[Header, ...]:
     """Return the queries that a word means: the one of that name, or those that answer it."""
     name = word.lower().replace("_", "-")
-    names = (name,) if name in _files() else QUERIES_BY_WORD.get(name.removesuffix("s"), ())
+    names = (name,) if name in _files() else queries_by_word().get(name.removesuffix("s"), ())
     return tuple(map(load_query, names))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +23,7 @@ from msgflow.run.choice import Run, choose_one, choose_runs, read_runs
 from msgflow.run.slice import Slice
 from msgflow.run.window import MAXIMUM_NS
 from msgflow.sql.failure import query_errors
-from msgflow.sql.header import Header, read
+from msgflow.sql.header import read
 from msgflow.sql.statement import internal_sql, registered
 
 if TYPE_CHECKING:
@@ -288,7 +287,8 @@ def _compared(
         require_places(connection, [run], {"from": asked["from"], "to": asked["to"]})
     with query_errors("the comparison", "the comparison failed: {}"):
         table = internal_sql().run(connection, "comparison", asked).to_arrow_table()
-    result = QueryResult(table, _header(), (first, second))
+    header = read(resource_directory("schema") / "public" / "comparison.sql")
+    result = QueryResult(table, header, (first, second))
     if is_strict:
         result.notes.extend(_one_sided(result, what, [first], [second]))
         result.notes.extend(function_notes(connection, asked))
@@ -325,11 +325,6 @@ def _slow_starts(compared: Comparison) -> Iterable[str]:
             f"run {' and run '.join(slow)} may warm up: its longest values lie at its start;"
             f" --skip-first {_warm_up(compared):g} leaves it out"
         )
-
-
-@cache
-def _header() -> Header:
-    return read(resource_directory("schema") / "public" / "comparison.sql")
 
 
 def _require_sense(asked: dict[str, Any]) -> None:

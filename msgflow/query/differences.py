@@ -6,9 +6,10 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import duckdb
+import pyarrow as pa
 
 from msgflow.errors import UsageError
 from msgflow.query.selection import CUT_COLUMN
@@ -24,15 +25,6 @@ _CONDITION = re.compile(
     rf"\s*(?P<unit>%|ns|us|µs|ms|s)|{SHARE}\s*<\s*-\s*(?P<points>\d+(?:\.\d+)?)\s*%)\s*"
 )
 _UNIT_NS = {"ns": 1, "us": 1_000, "µs": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
-# What a verdict adds to a failure: the measured values decide, and these may be chance.
-_CHANCE = {
-    "no difference shown": "; it may be chance",
-    "about equal": "; less than --at-least",
-    "too few values": "; too few values to exclude chance",
-    "too few independent values": "; too few independent values to exclude chance",
-    "too few runs": "; too few runs to exclude chance",
-    "not estimated": "; one value of each, it may be chance",
-}
 _NONE = "none shown"
 _CHANGED = ("longer", "shorter", "both", "only in A", "only in B")
 
@@ -43,8 +35,8 @@ class Condition:
 
     text: str  # as the user wrote it, such as 'p95>5%' or 'share<-1%'
     statistic: str  # one of STATISTICS, or SHARE
-    limit: float  # in percent of run A, or in nanoseconds; for a share in percentage points
-    is_relative: bool  # the limit is in percent
+    allowed: float  # in percent of run A, or in nanoseconds; for a share in percentage points
+    is_relative: bool  # it is in percent
 
 
 @dataclass(frozen=True)
@@ -112,20 +104,24 @@ class Differences:
         decide, even if the difference may be chance.
         """
         wanted = parse_conditions(conditions)
-        rows = self.result.to_arrow().to_pylist()
-        if wanted and any(row[CUT_COLUMN] for row in rows):
+        if not wanted:
+            return []
+        if any(self.result.to_arrow()[CUT_COLUMN].to_pylist()):
             raise UsageError(
                 f"not all paths were compared, so that nothing holds of all — {wanted[0].text}",
                 self.all_paths,
             )
-        return [
-            Failure(condition.text, row["subject"], reason + _chance(condition, row))
-            for condition in wanted
-            for row in rows
-            if row["statistic"]
-            == (STATISTICS[0] if condition.statistic == SHARE else condition.statistic)
-            and (reason := _excess(condition, row)) is not None
-        ]
+        places = [vars(each) | {"place": place} for place, each in enumerate(wanted)]
+        tables = {"compared": self.result.table, "condition": pa.Table.from_pylist(places)}
+        with duckdb.connect() as con, registered(con, **tables):
+            rows = internal_sql().run(con, "excess", {}).fetchall()
+        for condition, subject, reason, a_text in rows:
+            if reason is None:
+                raise UsageError(
+                    f"no percentage can be told of {a_text} in A: {condition} — {subject}",
+                    "msgflow clocks apply messages, or a limit in ns, us, ms or s",
+                )
+        return [Failure(*row[:3]) for row in rows]
 
 
 def parse_conditions(texts: Iterable[str]) -> list[Condition]:
@@ -147,48 +143,3 @@ def _parse(text: str) -> Condition:
     return Condition(
         text.strip(), found["statistic"], float(found["limit"]) * _UNIT_NS.get(unit, 1), unit == "%"
     )
-
-
-def _excess(condition: Condition, row: dict[str, Any]) -> str | None:
-    a_ns, b_ns = row["a_ns"], row["b_ns"]
-    if condition.statistic == SHARE:
-        return _shortfall(condition, row["a_share"], row["b_share"])
-    if a_ns is None:
-        return None
-    if b_ns is None:
-        return "has no value in B"
-    difference = b_ns - a_ns
-    if not condition.is_relative:
-        return f"{_ms(difference)} more" if difference > condition.limit else None
-    if a_ns < 0:
-        raise UsageError(
-            f"no percentage can be told of {_ms(a_ns)} in A: {condition.text} — {row['subject']}",
-            "msgflow clocks apply messages, or a limit in ns, us, ms or s",
-        )
-    if a_ns == 0:
-        return f"{_ms(b_ns)}, and 0 ms in A" if difference > 0 else None
-    if difference * 100 > condition.limit * a_ns:
-        return f"{100 * difference / a_ns:.4g} % more ({_ms(a_ns)} to {_ms(b_ns)})"
-    return None
-
-
-def _chance(condition: Condition, row: dict[str, Any]) -> str:
-    if condition.statistic == SHARE or row["b_ns"] is None:
-        return ""
-    return _CHANCE.get(row["verdict"], "")
-
-
-def _shortfall(condition: Condition, a_share: float | None, b_share: float | None) -> str | None:
-    if a_share is None:
-        return None
-    if b_share is None:
-        return "has nothing in B that could arrive"
-    # Shares have four digits.
-    points = round(100 * (a_share - b_share), 2)
-    if points > condition.limit:
-        return f"{points:.4g} points less ({100 * a_share:.4g} % to {100 * b_share:.4g} %)"
-    return None
-
-
-def _ms(nanoseconds: float) -> str:
-    return f"{nanoseconds / 1e6:.6g} ms"

@@ -37,7 +37,6 @@ _LISTED_BY = {
     "host": "msgflow info --section hosts",
     "place": "msgflow graph --format table",
 }
-_WORDS = {"place": "topic or node"}
 # Parameters that take an id, in every query: the view and column of it, and the command that lists
 # the ids.
 _IDS = {
@@ -123,13 +122,14 @@ def require_names(
     # Names of ROS itself, such as services of parameters, come last.
     known = list(dict.fromkeys(each for _, each in sorted(there)))
     ordinary = [each for is_internal, each in sorted(there) if not is_internal]
-    what = _WORDS.get(kind, kind)
+    what, plural = kind, f"{kind}s"
+    if kind == "place":
+        what, plural = "topic or node", "topics and nodes"
     where = "the run" if len(runs) == 1 else "these runs"
     is_pattern = any(character in name for character in "*?[")
     problem = f"no {what} in {where} fits" if is_pattern else f"there is no such {what} in {where}"
     more = len(known) - _SHOWN
     rest = f" and {more} more ({source})" if more > 0 else ""
-    plural = "topics and nodes" if what == "topic or node" else f"{what}s"
     shown = f"the {plural} are {', '.join(known[:_SHOWN])}{rest}" if known else source
     hint = did_you_mean(name, ordinary, did_you_mean(name, known, shown))
     raise UsageError(f"{problem} — {name}", hint)

@@ -7,6 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
+import pyarrow as pa
+import pyarrow.compute as pc
+
 from msgflow.query.selection import KINDS
 from msgflow.run.window import format_epoch
 from msgflow.sql.statement import internal_sql, registered
@@ -14,7 +17,6 @@ from msgflow.text.values import ARROW, format_duration
 
 if TYPE_CHECKING:
     import duckdb
-    import pyarrow as pa
 
     from msgflow.query.selection import Selection
     from msgflow.result.query_result import QueryResult
@@ -22,28 +24,13 @@ if TYPE_CHECKING:
     from msgflow.run.window import Window
     from msgflow.sql.value import Value
 
-# By the note of a header: what has rows where that was recorded, and what to say where it was not.
-_LACKING = {
-    "kernel": (
-        "thread_state",
-        "the kernel was not traced: msgflow record --kernel, see docs/scheduling.md",
-    ),
-    "samples": (
-        "stack_sample",
-        "no functions were sampled: msgflow record --profile 99, see docs/functions.md",
-    ),
-}
+# Notes of headers: a query with one of these has no rows where that was not recorded.
+_SOURCES = ("requests", "goals", "kernel", "samples")
 # How many values of a row pass such a link, or whether its flow does.
 AMBIGUOUS = "ambiguous"
 _MARKS = (AMBIGUOUS, "is_ambiguous")
 # What has the nodes: a path, or in a verification what was measured.
 _WAYS = ("path", "subject")
-_FOUND = """
-SELECT subject, detail, cure
-FROM main.finding
-WHERE list_contains($runs, run_id) AND name IN ('ambiguous_cause', 'ambiguous_link')
-ORDER BY name, run_id, subject
-"""
 _MOST = 3
 _SAMPLED = "SELECT count(DISTINCT run_id) FROM main.stack_sample WHERE run_id IN ($run_a, $run_b)"
 _ASKED = ("run_a", "run_b", "skip_first", "a_window", "b_window")
@@ -80,10 +67,10 @@ def empty_notes(
     selection: Selection,
 ) -> list[str]:
     """Return why a query whose header has this note has no rows."""
-    untraced = _not_traced(connection, runs, note)
+    unrecorded = _unrecorded(connection, runs, note) if note in _SOURCES else []
     narrowing = _narrowing(parameters, selection)
-    if untraced or not narrowing:
-        return untraced
+    if unrecorded or not narrowing:
+        return unrecorded
     why = _missing_way(connection, runs, parameters) or "try with less"
     return [f"nothing fits {' '.join(narrowing)}: {why}"]
 
@@ -97,48 +84,15 @@ def row_notes(
         notes += clock_notes(connection, runs)
         notes += _untraced_notes(connection, runs, table)
     if note == "callbacks":
-        notes += _without_callbacks(connection, runs)
+        notes += _unrecorded(connection, runs, note)
     return notes
 
 
-def _not_traced(
+def _unrecorded(
     connection: duckdb.DuckDBPyConnection, runs: Sequence[Run], note: str | None
 ) -> list[str]:
-    """Return notes on missing events, if the rows would have come from them."""
-    if note in {"requests", "goals"}:
-        # Other events of a run may show that this layer was not traced.
-        rows = connection.execute(
-            "SELECT run_id, detail FROM main.finding WHERE list_contains($runs, run_id) "
-            "AND name = 'missing_layer' AND subject = $layer ORDER BY run_id",
-            {"runs": [run.run_id for run in runs], "layer": note},
-        ).fetchall()
-        titles = {run.run_id: "" if len(runs) == 1 else f"run {run.title}: " for run in runs}
-        return [f"{titles[run_id]}{detail}" for run_id, detail in rows]
-    if note not in _LACKING:
-        return []
-    view, lacking = _LACKING[note]
-    found = connection.execute(
-        f"SELECT 1 FROM main.{view} WHERE list_contains(?, run_id) LIMIT 1",
-        [[run.run_id for run in runs]],
-    )
-    return [] if found.fetchall() else [lacking]
-
-
-def _without_callbacks(connection: duckdb.DuckDBPyConnection, runs: Sequence[Run]) -> list[str]:
-    """Return a note that names processes without known callbacks, if there are any."""
-    rows = connection.execute(
-        "SELECT DISTINCT subject FROM main.finding "
-        "WHERE list_contains($runs, run_id) AND name = 'process_without_rclcpp' ORDER BY subject",
-        {"runs": [run.run_id for run in runs]},
-    ).fetchall()
-    if not rows:
-        return []
-    names = ", ".join(subject for (subject,) in rows)
-    what = "process records" if len(rows) == 1 else "processes record"
-    return [
-        f"{len(rows)} {what} no callbacks, without rclcpp (as those of rclpy): {names};"
-        " msgflow query path-breakdown has their times from take to publication"
-    ]
+    chosen = {"runs": [run.run_id for run in runs], "note": note}
+    return _sentences(connection, "unrecorded", chosen)
 
 
 def _narrowing(parameters: Mapping[str, Value], selection: Selection) -> list[str]:
@@ -186,21 +140,8 @@ def _untraced_notes(
     """Return where flows begin whose first publisher is not traced, if paths have any."""
     if "path" not in table.column_names:
         return []
-    chosen = {"runs": [run.run_id for run in runs]}
-    begins = internal_sql().run(connection, "untraced_begin", chosen).fetchall()
-    if not begins:
-        return []
-    paths = [path for path in table["path"].unique().to_pylist() if path is not None]
-    where = {
-        True: "the stamp of each message",
-        False: "its take: its clock may be another one",
-        None: "the stamp of each message, or its take where its clock may be another one",
-    }
-    return [
-        f"what publishes {topic} is not traced: flows begin with {where[is_stamped]}"
-        for topic, is_stamped in begins
-        if any(path.startswith(f"(not traced) → {topic} → ") for path in paths)
-    ]
+    with registered(connection, noted=table.select(["path"])):
+        return _sentences(connection, "untraced_note", {"runs": [run.run_id for run in runs]})
 
 
 def clock_verdicts(
@@ -228,19 +169,12 @@ def doubt_notes(
     )
     if mark is None or way is None:
         return []
-    with registered(connection, doubtful=table):
-        doubted = connection.execute(
-            f"SELECT DISTINCT {way} FROM doubtful WHERE {mark}::BOOLEAN"
-        ).fetchall()
-    if not doubted:
+    noted = pa.table({"way": table[way], "mark": table[mark].cast(pa.bool_())})
+    # Most results need no note: this takes no time.
+    if not pc.any(noted["mark"]).as_py():
         return []
-    places = {step for (steps,) in doubted if steps is not None for step in steps.split(" → ")}
-    found = connection.execute(_FOUND, {"runs": [run.run_id for run in runs]}).fetchall()
-    return [
-        f"{subject}: {detail}, and flows through it with them. {cure.rstrip('.')}"
-        for subject, detail, cure in found
-        if subject in places
-    ] or ["some flows pass a link that may be another one: candidate_count of the links"]
+    with registered(connection, noted=noted):
+        return _sentences(connection, "doubt_note", {"runs": [run.run_id for run in runs]})
 
 
 def schedule_notes(

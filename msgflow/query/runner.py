@@ -25,7 +25,7 @@ from msgflow.query.selection import (
 from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import LATEST, Slice
 from msgflow.sql.failure import first_line, query_errors
-from msgflow.sql.statement import RECORDED, may_have_rows, recorded
+from msgflow.sql.statement import may_have_rows, recorded
 from msgflow.sql.value import described_type, parse_text
 from msgflow.text.name_suggestions import did_you_mean
 
@@ -36,18 +36,9 @@ if TYPE_CHECKING:
     from msgflow.sql.header import Header, Param
     from msgflow.sql.value import Value
 
-RESERVED = ("runs", "start_ns", "end_ns", *RECORDED)
 _COLUMN = re.compile(r'Referenced column "([^"]*)"')
 # Errors that a user's condition may cause: the queries themselves are tested.
-_OF_CONDITIONS = (
-    duckdb.BinderException,
-    duckdb.CatalogException,
-    duckdb.PermissionException,
-    duckdb.ParserException,
-    duckdb.ConversionException,
-    duckdb.OutOfRangeException,
-    duckdb.InvalidInputException,
-)
+_OF_CONDITIONS = (duckdb.ProgrammingError, duckdb.DataError, duckdb.PermissionException)
 
 
 class Steps:
@@ -76,7 +67,7 @@ class Steps:
 
     @cached_property
     def recorded(self) -> Mapping[str, bool]:
-        """What the recordings of the database have, by the names in RECORDED."""
+        """What the recordings of the database have, by the names in `RECORDED`."""
         return recorded(self._connection)
 
     def make(self, header: Header, values: Mapping[str, Any]) -> None:

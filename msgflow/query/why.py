@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import partial
@@ -30,19 +30,6 @@ if TYPE_CHECKING:
 
 _PIECES = 5
 _OF_VERDICT = ("open_end", "why_callback", "suspect")
-# By what took longest in a slow flow: the query that shows more of it, by node or by topic.
-_BY_NODE = {
-    "callback": ("callbacks", "--each", "--slowest", "5"),
-    **dict.fromkeys(
-        ("executor_busy", "all_threads_busy", "blocked", "undecided", "take_to_callback"),
-        ("waits", "--by", "instance", "--slowest", "5"),
-    ),
-    "timer": ("timers",),
-    "service": ("service-latency",),
-}
-_BY_STATE = {"preempted": "preemption", "runnable": "wakeup"}
-_BY_TOPIC = dict.fromkeys(("network_or_idle", "undecided"), ("topics", "--measure", "latency"))
-_LINKS = ("suggest", "links")
 _DEAD_ENDS = (
     "SELECT subject, detail FROM store.finding WHERE name = 'dead_end' AND list_contains(?, run_id)"
 )
@@ -71,7 +58,6 @@ _UNKNOWN = {
 }
 # What a path has in place of a topic without a name.
 _UNNAMED = "?"
-_NO_NAMES = (None, _UNNAMED)
 # Rows of an explanation: what its callbacks waited for, what was lost on the way, and the paths.
 _OWN_WAITS = "FROM result WHERE list_contains($callbacks, [node, callback]) LIMIT 3"
 _OWN_LOSSES = (
@@ -79,8 +65,6 @@ _OWN_LOSSES = (
     " AND list_contains($places, subscriber) AND dropped + lost > 0"
 )
 _WORST_FIRST = "FROM result ORDER BY path <> $path, p95_ns DESC NULLS LAST, path"
-# Queries with rows of callbacks: none of what a node without traced callbacks did.
-_OF_CALLBACKS = ("callbacks", "waits")
 
 
 @dataclass(frozen=True)
@@ -189,8 +173,7 @@ def _explained(
     path = _worst(verdict, paths)
     places = path.split(" → ")
     flow = ask("critical-path", **ends, via=[path], quantile="p95")
-    pieces = flow.table.to_pylist()
-    parts = _rows(connection, "FROM result WHERE path = $path", parts, path=path)
+    parts = _rows(connection, "FROM result WHERE path = $path", parts, "result", path=path)
     callbacks = [[row["node"], row["what"]] for row in parts.table.to_pylist()]
     # What is said of paths that end at a node which publishes.
     ends_of = [each.split(" → ")[-2:] for each in ([path] if place is None else shown)]
@@ -201,9 +184,16 @@ def _explained(
         if any(node == last and f" on {topic} " in detail for topic, last in ends_of)
     )
     ends_here = list(dict.fromkeys(said))
-    waits = _rows(connection, _OWN_WAITS, waits, callbacks=callbacks)
-    losses = _rows(connection, _OWN_LOSSES, losses, places=places)
-    paths = _rows(connection, _WORST_FIRST, paths, path=path)
+    waits = _rows(connection, _OWN_WAITS, waits, "result", callbacks=callbacks)
+    losses = _rows(connection, _OWN_LOSSES, losses, "result", places=places)
+    paths = _rows(connection, _WORST_FIRST, paths, "result", path=path)
+    internal = internal_sql()
+    asked_for = {
+        "has_unknown": bool(ends_here) or _UNNAMED in places,
+        "since": ["--start", f"{skipped:g}s"] if skipped else [],
+    }
+    with registered(connection, piece=flow.table, loss=losses.table):
+        steps = internal.run(connection, "next_command", asked_for).fetchall()
     sentences = " ".join(verdict["sentence"].to_pylist())
     notes = [cure for unknown, cure in _UNKNOWN.items() if unknown in sentences]
     if skipped:
@@ -218,11 +208,13 @@ def _explained(
         place=place,
         verdict=replace(paths, table=verdict, header=None, notes=[], path_numbers={}),
         paths=paths,
-        nodes=_derived(connection, "node_share", "breakdown", parts, path=path),
-        slow_flow=_derived(connection, "longest_piece", "slow_flow", flow, count=_PIECES),
+        nodes=_rows(connection, internal.text("node_share"), parts, "breakdown", path=path),
+        slow_flow=_rows(
+            connection, internal.text("longest_piece"), flow, "slow_flow", count=_PIECES
+        ),
         waits=waits,
         losses=losses,
-        steps=tuple(dict.fromkeys(_steps(places, ends_here, pieces, losses, skipped))),
+        steps=tuple(tuple(words) for (words,) in steps),
         notes=tuple(dict.fromkeys(notes)),
     )
 
@@ -269,65 +261,11 @@ def _nothing(ask: Ask, place: str | None) -> NoFlowError:
 
 
 def _rows(
-    connection: duckdb.DuckDBPyConnection, sql: str, of: QueryResult, **values: Any
+    connection: duckdb.DuckDBPyConnection, sql: str, of: QueryResult, name: str, **values: Any
 ) -> QueryResult:
-    """Return a result with the rows of a query on it, which it calls `result`."""
-    with registered(connection, result=of.table):
+    """Return a result with the rows of a query on it, which reads it by this name."""
+    with registered(connection, **{name: of.table}):
         return replace(of, table=connection.sql(sql, params=values).to_arrow_table())
-
-
-def _derived(
-    connection: duckdb.DuckDBPyConnection, name: str, rows: str, of: QueryResult, **values: Value
-) -> QueryResult:
-    """Return what a statement makes of a result, whose rows it reads by this name."""
-    with registered(connection, **{rows: of.table}):
-        found = internal_sql().run(connection, name, values)
-        return replace(of, table=found.to_arrow_table())
-
-
-def _steps(
-    places: Sequence[str],
-    dead_ends: Sequence[str],
-    pieces: Sequence[dict[str, Any]],
-    losses: QueryResult,
-    skipped: float,
-) -> Iterator[tuple[str, ...]]:
-    """Yield the commands that show more: of the longest piece, the flow, and lost messages.
-
-    First comes what the path lacks: links, or names of topics.
-    """
-    since = ("--start", f"{skipped:g}s") if skipped else ()
-    if dead_ends or _UNNAMED in places:
-        yield _LINKS
-    # A name that no trace has, such as a blank, may lead to no flow.
-    if pieces:
-        yield from _into_flow(pieces, since)
-    if len(losses):
-        topics = set(losses.table["topic_name"].to_pylist())
-        named = (
-            []
-            if None in topics
-            else [word for topic in sorted(topics) for word in ("--topic", topic)]
-        )
-        yield ("query", "topics", "--measure", "unmatched", *named)
-
-
-def _into_flow(
-    pieces: Sequence[dict[str, Any]], since: tuple[str, ...]
-) -> Iterator[tuple[str, ...]]:
-    longest = max(pieces, key=lambda row: row["duration_ns"])
-    if of_state := _BY_STATE.get(longest["state"] or ""):
-        yield ("query", "scheduling", "--measure", of_state, *since)
-    # What the trace has no name for cannot be asked for.
-    elif (
-        longest["node"] not in _NO_NAMES
-        and (of_node := _BY_NODE.get(longest["activity"]))
-        and (longest["callback_instance_id"] is not None or of_node[0] not in _OF_CALLBACKS)
-    ):
-        yield ("query", *of_node, "--node", longest["node"], *since)
-    elif (of_topic := _BY_TOPIC.get(longest["activity"])) and longest["what"] not in _NO_NAMES:
-        yield ("query", *of_topic, "--topic", longest["what"], *since)
-    yield ("flow", "--take", str(pieces[0]["take_id"]), "--why")
 
 
 def with_functions(

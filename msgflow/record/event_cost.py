@@ -12,6 +12,7 @@ from threading import Timer
 from msgflow.errors import RecordingError
 from msgflow.files.temporary_owner import mark, temporary_directory
 from msgflow.record.session import TEMPORARY, Channel, recording_session
+from msgflow.trace.regular_file import read_regular
 
 USUAL_NS = 158.0
 """Nanoseconds of an event, as the authors of the method have them."""
@@ -93,9 +94,7 @@ def event_cost_ns(traces: Iterable[str]) -> float | None:
     for trace in traces:
         for folder in [Path(trace), *Path(trace).parents][:_LEVELS]:
             # The folder is what a database says, and that may be a stranger's: a pipe would hang.
-            file = folder / _FILE
             with suppress(OSError, ValueError):
-                if file.is_file() and file.stat().st_size <= _MOST_BYTES:
-                    cost = float(file.read_text("utf-8"))
-                    return cost if _LEAST_NS < cost < _MOST_NS else None
+                cost = float(read_regular(folder / _FILE, _MOST_BYTES))
+                return cost if _LEAST_NS < cost < _MOST_NS else None
     return None

@@ -16,10 +16,13 @@ from msgflow.errors import RecordingError
 from msgflow.record.daemon import session_daemon
 from msgflow.record.event_cost import measure_event_cost
 from msgflow.record.lttng import losses, ros_processes, sessions
-from msgflow.record.profile import recorded_samples, with_python_functions
-from msgflow.record.program import Program, require_program
-from msgflow.record.python_path import with_python_nodes
-from msgflow.record.scheduling import recorded_with_perf
+from msgflow.record.perf import recorded_samples, recorded_with_perf
+from msgflow.record.program import (
+    Program,
+    require_program,
+    with_python_functions,
+    with_python_nodes,
+)
 from msgflow.record.session import (
     Channel,
     can_trace_kernel,
@@ -35,7 +38,7 @@ from msgflow.sql.interrupt import noted_interrupts, until_interrupted
 from msgflow.trace.ctf.packet_index import content_bytes
 
 if TYPE_CHECKING:
-    from msgflow.record.profile import Rate
+    from msgflow.record.perf import Rate
 
 BYTES_OF_EVENT = 45
 """The usual size of an event of ROS 2 with its contexts."""

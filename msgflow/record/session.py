@@ -12,7 +12,7 @@ from pathlib import Path
 from msgflow.errors import RecordingError, UsageError
 from msgflow.files.temporary_owner import is_abandoned, mark, remove_abandoned_directories
 from msgflow.record.lttng import is_daemon_running, lttng, sessions
-from msgflow.record.scheduling import KERNEL_EVENTS
+from msgflow.record.perf import KERNEL_EVENTS
 from msgflow.trace.regular_file import read_regular
 
 # Of ROS 2; of an instrumented DDS; of CARET; of Agnocast.

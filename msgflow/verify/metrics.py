@@ -74,7 +74,9 @@ def _subject(given: dict[str, Any], names: dict[str, str]) -> Subject:
 
 
 _GIVEN = tomllib.loads(_FILE.read_text(encoding="utf-8"))
-SUBJECTS = {
-    kind: _subject(given, _GIVEN["names"]) for kind, given in _GIVEN.items() if kind != "names"
-}
+KEYS: dict[str, str] = _GIVEN.pop("keys")
+"""SQL of what finds the worst case in a row of the measuring query, by the kind of the case."""
+
+_NAMES = _GIVEN.pop("names")
+SUBJECTS = {kind: _subject(given, _NAMES) for kind, given in _GIVEN.items()}
 """Kinds of things with requirements, by the key of a target that names them."""

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from msgflow.files.yaml_file import Text, YamlFile, is_null, line_of
+from msgflow.files.yaml_file import Text, YamlFile, line_of
 from msgflow.text.name_suggestions import meant_or, nearest
 from msgflow.verify.condition import Condition, ConditionError, parse_condition
 from msgflow.verify.metrics import ENDS, PATH, SUBJECTS
@@ -146,7 +146,7 @@ def _kind(file: YamlFile, node: Any) -> str:
 
 def _path_name(file: YamlFile, node: Any) -> Text | None:
     # Topics begin with a slash.
-    if node.id != "scalar" or is_null(node) or str(node.value).startswith("/"):
+    if node.id != "scalar" or str(node.value).startswith("/"):
         return None
     return file.text(node, PATH, "the name of a path")
 
@@ -171,8 +171,6 @@ def _path(file: YamlFile, node: Any) -> tuple[Text, ...]:
 
 def _requirements(file: YamlFile, kind: str, name: str, node: Any) -> list[Requirement]:
     metric = SUBJECTS[kind].metrics[name]
-    if is_null(node):
-        file.fail(line_of(node), f"{name} has no value", _EXAMPLE)
     found = []
     for text in file.texts(node, name, "a condition"):
         try:

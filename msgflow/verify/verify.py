@@ -24,8 +24,8 @@ from msgflow.sql.statement import internal_sql, registered
 from msgflow.text.name_suggestions import did_you_mean
 from msgflow.verify.condition import format_value
 from msgflow.verify.junit import junit_xml
-from msgflow.verify.metrics import ENDS, PATH, SUBJECTS
-from msgflow.verify.worst_case import KEYS, LOST_FLOW, find_worst_case, worst_case_of
+from msgflow.verify.metrics import ENDS, KEYS, PATH, SUBJECTS
+from msgflow.verify.worst_case import LOST_FLOW, find_worst_case, worst_case_of
 
 if TYPE_CHECKING:
     import duckdb

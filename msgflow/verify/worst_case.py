@@ -13,22 +13,6 @@ if TYPE_CHECKING:
 
     from msgflow.run.window import Window
 
-
-# The key of a row of the measuring query, by kind of worst case. The longest flow is in that row
-# itself. For others the statement `worst_…` returns duration, begin, id and kind; for lost flows,
-# the one below does.
-KEYS = {
-    "flow": "[max_ns, max_root_ns, max_take_id]",
-    "first_flow": "[first_max_ns, first_max_root_ns, first_max_take_id]",
-    "last_flow": "[last_max_ns, last_max_root_ns, last_max_take_id]",
-    "lost_flow": "path",
-    "callback": "callback_id",
-    "late_call": "callback_id",
-    "preemption": "callback_id",
-    "message": "subscription_id",
-    "request": "[service_id, client_id]",
-    "goal": "[action_server_id, action_client_id]",
-}
 LOST_FLOW = """
 SELECT NULL::BIGINT AS latency_ns, root_ns, root_id, root_kind
 FROM ({}) WHERE path = $subject AND status IN ('dropped', 'lost')

@@ -43,11 +43,6 @@ class _Told:
     until_ns: int  # until when all was judged
     causes: Row  # those that were told of it
 
-    @classmethod
-    def of(cls, row: Row, until_ns: int, before: _Told | None) -> _Told:
-        worst_ns = max(row["worst_ns"] or 0, 0 if before is None else before.worst_ns)
-        return cls(worst_ns, until_ns, {name: row[name] for name in _CAUSES})
-
     def is_surpassed(self, worst_ns: int | None, at_ns: int | None) -> bool:
         is_later = at_ns is not None and at_ns >= self.until_ns
         return is_later or (worst_ns or 0) > self.worst_ns
@@ -100,9 +95,11 @@ class Alarm:
         failing = {}
         culprits: list[Row] | None = None
         for row in rows:
-            self._remember(row)
+            verdict = Verdict(row["verdict"])
+            before = self._verdicts.get(_key(row), verdict)
+            self._verdicts[_key(row)] = min(before, verdict, key=_STRONGEST.index)
             row |= dict.fromkeys(_CAUSES) | {"flows": self._flows(con, row, part)}
-            if row["verdict"] != Verdict.FAILED:
+            if verdict != Verdict.FAILED:
                 continue
             key = tuple(row[name] for name in ("target", "metric", "condition", "subject", "path"))
             told = self._failing.get(key)
@@ -113,7 +110,8 @@ class Alarm:
                 row |= {name: found[-1][name] for name in _CAUSES}
             else:
                 row |= told.causes
-            failing[key] = _Told.of(row, window.end_ns, told)
+            worst_ns = max(row["worst_ns"] or 0, 0 if told is None else told.worst_ns)
+            failing[key] = _Told(worst_ns, window.end_ns, {name: row[name] for name in _CAUSES})
         self._failing = failing
         self._note_silence(rows)
         return found, rows
@@ -135,11 +133,6 @@ class Alarm:
                 numbers = {name: each[f"{prefix}{name}"] for name in ("median_ns", "p99_ns")}
                 return numbers | {name: each[name] for name in ("lost", "dropped")}
         return None
-
-    def _remember(self, row: Row) -> None:
-        key, verdict = _key(row), Verdict(row["verdict"])
-        before = self._verdicts.get(key, verdict)
-        self._verdicts[key] = min(before, verdict, key=_STRONGEST.index)
 
     def _note_silence(self, rows: Sequence[Row]) -> None:
         """Say what had data before and has none in this window, once for each silence."""

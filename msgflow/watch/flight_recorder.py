@@ -19,7 +19,7 @@ from msgflow.watch.learned_answers import LEARNED_FILE
 
 if TYPE_CHECKING:
     from msgflow.links.links_file import LinksFile
-    from msgflow.watch.kept_traces import KeptTraces
+    from msgflow.watch.kept_chunk import KeptTraces
 
 _DATABASE = "msgflow.duckdb"
 # A directory is ours, and may be removed, if this file is in it. It holds the end of the violation.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msgflow.run.window import Window
-from msgflow.watch.kept_traces import KeptTraces
+from msgflow.watch.kept_chunk import KeptTraces
 
 if TYPE_CHECKING:
     from msgflow.watch.kept_chunk import KeptChunk

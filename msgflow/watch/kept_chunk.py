@@ -1,9 +1,10 @@
-"""A chunk that was read: its events and packets, kept in memory as the reader delivered them."""
+"""Chunks kept in memory as the reader delivered them, and read again as one set of traces."""
 
 from __future__ import annotations
 
 import os
 import socket
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,13 +17,14 @@ import pyarrow.compute as pc
 from msgflow import trace as trace_package
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.load import wanted_events
-from msgflow.trace import PACKET
+from msgflow.trace import PACKET, EventBatch, TraceSet
 from msgflow.trace.numpy_arrow import to_arrow, to_numpy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from msgflow.trace import Continuation, Damage, TraceInfo
+    from msgflow.trace.trace_set import Batches, Report, Wanted
     from msgflow.watch.chunk import Chunk
 
 
@@ -71,14 +73,75 @@ class KeptChunk:
         events = {name: [batch] for name, batch in self.events.items()}
         for name, batch in later.events.items():
             ids = to_numpy(batch["event_id"]) + self.times_ns.size
-            events.setdefault(name, []).append(placed(with_column(batch, "event_id", ids), places))
+            events.setdefault(name, []).append(
+                _placed(_with_column(batch, "event_id", ids), places)
+            )
         return replace(
             later,
             traces=tuple(traces),
-            events={name: joined(batches) for name, batches in events.items()},
+            events={name: _joined(batches) for name, batches in events.items()},
             times_ns=np.concatenate([self.times_ns, later.times_ns]),
             begin_ns=self.begin_ns,
         )
+
+
+class KeptTraces(TraceSet):
+    """Chunks that follow each other, behind what lasts of earlier ones."""
+
+    def __init__(self, lasting: Sequence[KeptChunk], chunks: Sequence[KeptChunk]) -> None:
+        """Join them."""
+        super().__init__()
+        self._parts = (*lasting, *chunks)
+        traces: list[TraceInfo] = []
+        # Of each part: its trace index -> that in the set.
+        self._places: list[list[int]] = []
+        # One trace stands for all that is left of a recording.
+        places: dict[str, int] = {}
+        begin_ns = min(chunk.begin_ns for chunk in chunks)
+        for part in lasting:
+            own = []
+            for trace in part.traces:
+                place = places.setdefault(trace.identity, len(traces))
+                if place == len(traces):
+                    # The set begins with its packets, however long ago its objects were made.
+                    short = replace(trace, index=place, begin_ns=begin_ns, end_ns=begin_ns)
+                    traces.append(short)
+                own.append(place)
+            self._places.append(own)
+        for chunk in chunks:
+            self._places.append([len(traces) + trace.index for trace in chunk.traces])
+            traces += [replace(trace, index=len(traces) + trace.index) for trace in chunk.traces]
+        self.traces = tuple(traces)
+        counts: Counter[tuple[int, str]] = Counter()
+        for part, places_of_part in zip(self._parts, self._places, strict=True):
+            for (index, name), count in part.event_counts.items():
+                counts[places_of_part[index], name] += count
+        self.event_counts = dict(counts)
+        self.damages = [
+            replace(damage, trace_index=places_of_part[damage.trace_index])
+            for part, places_of_part in zip(self._parts, self._places, strict=True)
+            for damage in part.damages
+        ]
+
+    def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
+        # In one round. What is wanted was decided when the chunks were read.
+        firsts = np.cumsum([0, *(part.times_ns.size for part in self._parts)])
+        # Chunks overlap: the buffers of one CPU are exchanged after those of another.
+        order = np.argsort(np.concatenate([part.times_ns for part in self._parts]), kind="stable")
+        ids = np.empty_like(order)
+        ids[order] = np.arange(order.size)
+        events: dict[str, list[pa.RecordBatch]] = {}
+        for part, places, first in zip(self._parts, self._places, firsts[:-1], strict=True):
+            for packets in part.packets:
+                yield EventBatch(PACKET, _placed(packets, places), 0)
+            for name, batch in part.events.items():
+                numbered = _with_column(batch, "event_id", ids[first + to_numpy(batch["event_id"])])
+                events.setdefault(name, []).append(_placed(numbered, places))
+        for name, batches in events.items():
+            batch = _joined(batches)
+            by_id = np.argsort(to_numpy(batch["event_id"]), kind="stable")
+            is_ordered = bool((by_id == np.arange(by_id.size)).all())
+            yield EventBatch(name, batch if is_ordered else batch.take(by_id), 0)
 
 
 def read_chunk(chunk: Chunk, after: Continuation, *, without_own: bool = False) -> KeptChunk | None:
@@ -117,7 +180,7 @@ def read_chunk(chunk: Chunk, after: Continuation, *, without_own: bool = False) 
             damages=tuple(traces.damages),
             begin_ns=min(begins),
             end_ns=end_ns,
-            **_renumbered({name: joined(batches) for name, batches in events.items()}),
+            **_renumbered({name: _joined(batches) for name, batches in events.items()}),
         )
 
 
@@ -163,19 +226,19 @@ def _last_packets(packets: list[pa.RecordBatch], end_ns: int) -> pa.RecordBatch:
     return table.combine_chunks().to_batches()[0] if count else packets[0].slice(0, 0)
 
 
-def joined(batches: list[pa.RecordBatch]) -> pa.RecordBatch:
+def _joined(batches: list[pa.RecordBatch]) -> pa.RecordBatch:
     """Return the rows of batches of one schema as one batch."""
     table = pa.Table.from_batches(batches).unify_dictionaries().combine_chunks()
     return table.to_batches()[0] if table.num_rows else batches[0]
 
 
-def placed(batch: pa.RecordBatch, places: Sequence[int]) -> pa.RecordBatch:
+def _placed(batch: pa.RecordBatch, places: Sequence[int]) -> pa.RecordBatch:
     """Return a batch with other indexes of traces: the place of each one so far."""
     indexes = to_numpy(batch["trace_index"])
-    return with_column(batch, "trace_index", np.asarray(places, np.int32)[indexes])
+    return _with_column(batch, "trace_index", np.asarray(places, np.int32)[indexes])
 
 
-def with_column(batch: pa.RecordBatch, name: str, values: NDArray[Any]) -> pa.RecordBatch:
+def _with_column(batch: pa.RecordBatch, name: str, values: NDArray[Any]) -> pa.RecordBatch:
     """Return a batch with other values in a column."""
     place = batch.schema.get_field_index(name)
     return batch.set_column(place, batch.schema.field(place), to_arrow(values))
@@ -191,7 +254,7 @@ def _renumbered(events: Mapping[str, pa.RecordBatch]) -> dict[str, Any]:
     ranks[order] = np.arange(order.size)
     ends = np.cumsum([batch.num_rows for batch in events.values()])
     numbered = {
-        name: with_column(batch, "event_id", ranks[end - batch.num_rows : end])
+        name: _with_column(batch, "event_id", ranks[end - batch.num_rows : end])
         for (name, batch), end in zip(events.items(), ends, strict=True)
     }
     return {"events": numbered, "times_ns": times[order]}

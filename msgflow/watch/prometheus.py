@@ -130,11 +130,11 @@ class Exporter:
     def collect(self) -> Iterator[Metric]:
         """Yield all metrics, as a registry of prometheus-client asks for them."""
         with self._lock:
-            metrics = [*self._flows(), *self._counters(), *self._gauges()]
+            metrics = [*self._counted(), *self._gauges()]
         yield from metrics
 
-    def _flows(self) -> Iterator[Metric]:
-        from prometheus_client.core import HistogramMetricFamily
+    def _counted(self) -> Iterator[Metric]:
+        from prometheus_client.core import CounterMetricFamily, HistogramMetricFamily
 
         latency = HistogramMetricFamily(
             "msgflow_path_latency_seconds", "Latency from end to end", labels=["path"]
@@ -143,10 +143,6 @@ class Exporter:
             buckets = list(zip(map(str, BOUNDS_S), counts, strict=True))
             latency.add_metric([path], [*buckets, ("+Inf", number)], total_ns / _SECOND_NS)
         yield latency
-
-    def _counters(self) -> Iterator[Metric]:
-        from prometheus_client.core import CounterMetricFamily
-
         statuses = {
             (path, status): number
             for path, (known, _) in self._paths.items()

@@ -127,7 +127,11 @@ class WatchedSessions:
         here = self._below(found)
         for session in here:
             if session not in self._go_on:
-                self._begin_later(session)
+                try:
+                    self._begin(session)
+                except RecordingError as error:
+                    self._go_on[session] = None
+                    self._note(f"session {session.name} cannot be watched: {error.message}")
             elif (go_on := self._go_on[session]) is not None:
                 go_on()
         for session in self._absences:
@@ -147,13 +151,6 @@ class WatchedSessions:
     def _begin(self, session: Session) -> None:
         self._go_on[session] = self._stack.enter_context(rotated(session.name, self._step_ns))
         self._absences[session] = 0
-
-    def _begin_later(self, session: Session) -> None:
-        try:
-            self._begin(session)
-        except RecordingError as error:
-            self._go_on[session] = None
-            self._note(f"session {session.name} cannot be watched: {error.message}")
 
     def _say_why(self, found: list[Session], reason: str | None) -> None:
         """Say why the view ends, unless the sessions have just ended."""

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from msgflow.watch.alarm import Alarm
     from msgflow.watch.chunk import Chunk
     from msgflow.watch.flight_recorder import FlightRecorder
-    from msgflow.watch.kept_traces import KeptTraces
+    from msgflow.watch.kept_chunk import KeptTraces
     from msgflow.watch.prometheus import Exporter
     from msgflow.watch.window_database import WindowDatabase
     from msgflow.watch.window_report import WindowReport

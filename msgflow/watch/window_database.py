@@ -13,7 +13,7 @@ from msgflow.ingest import ingest
 
 if TYPE_CHECKING:
     from msgflow.links.links_file import LinksFile
-    from msgflow.watch.kept_traces import KeptTraces
+    from msgflow.watch.kept_chunk import KeptTraces
 
 
 class WindowDatabase:

@@ -18,7 +18,7 @@ from thorough import few, thorough
 
 from msgflow import Database, UsageError, __version__
 from msgflow.db.connection import recorded_revision
-from msgflow.export.views import Selection
+from msgflow.export.view_files import Selection
 
 CASES = Path(__file__).resolve().parents[1] / "schema" / "cases"
 LARGE = 18_446_744_073_709_551_615

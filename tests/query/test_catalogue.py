@@ -8,10 +8,10 @@ from msgflow.database import open_db
 from msgflow.db.objects import public_names
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import (
-    QUERIES_BY_WORD,
     choose_query,
     load_queries,
     load_query,
+    queries_by_word,
     query_names,
 )
 from msgflow.sql.value import Value
@@ -146,5 +146,5 @@ def test_words_for_what_a_query_answers(name: str, hint: str) -> None:
 
 
 def test_every_word_leads_to_a_query() -> None:
-    for queries in QUERIES_BY_WORD.values():
+    for queries in queries_by_word().values():
         assert all(load_query(query) for query in queries)

@@ -513,7 +513,7 @@ def test_a_condition_that_cannot_be_read_is_refused(text: str) -> None:
 
 def test_conditions_are_read() -> None:
     conditions = parse_conditions([" p95 > 5% ,max>1.5ms", "mean>20µs,share<-1.5 %"])
-    assert [(each.statistic, each.limit, each.is_relative) for each in conditions] == [
+    assert [(each.statistic, each.allowed, each.is_relative) for each in conditions] == [
         ("p95", 5, True),
         ("max", 1_500_000, False),
         ("mean", 20_000, False),

@@ -53,6 +53,11 @@ def connection() -> duckdb.DuckDBPyConnection:
         ") AS t (run_id, topic, start_ns, is_internal)"
     )
     con.execute("CREATE TABLE simulated_time (run_id BIGINT, at_ns BIGINT, simulated_ns BIGINT)")
+    con.execute(
+        "CREATE TABLE finding (run_id BIGINT, name VARCHAR, subject VARCHAR, detail VARCHAR)"
+    )
+    con.execute("CREATE TABLE thread_state (run_id BIGINT)")
+    con.execute("CREATE TABLE stack_sample (run_id BIGINT)")
     con.execute("CREATE SCHEMA store")
     con.execute("CREATE TABLE store.simulated_time AS FROM simulated_time")
     con.execute("CREATE SCHEMA derive")
@@ -350,7 +355,7 @@ def test_processes_that_record_no_callbacks_are_named(
     connection: duckdb.DuckDBPyConnection,
 ) -> None:
     connection.execute(
-        "CREATE TABLE finding AS SELECT * FROM (VALUES "
+        "INSERT INTO finding BY NAME SELECT * FROM (VALUES "
         "(1, 'process_without_rclcpp', 'b 8 on vm'), (1, 'process_without_rclcpp', 'a 7 on vm'), "
         "(1, 'started_late', 'c 9 on vm'), (2, 'process_without_rclcpp', 'd 1 on vm'), "
         "(3, 'started_late', 'c 9 on vm')) AS t (run_id, name, subject)"
@@ -377,7 +382,7 @@ def test_a_layer_that_was_not_traced_is_the_reason_for_no_rows(
     connection: duckdb.DuckDBPyConnection,
 ) -> None:
     connection.execute(
-        "CREATE TABLE finding AS SELECT * FROM (VALUES "
+        "INSERT INTO finding BY NAME SELECT * FROM (VALUES "
         "(1, 'missing_layer', 'requests', 'no request'), (2, 'missing_layer', 'requests', 'none'), "
         "(1, 'missing_layer', 'goals', 'no goal'), (1, 'started_late', 'requests', 'late')) "
         "AS t (run_id, name, subject, detail)"
@@ -413,7 +418,7 @@ def test_a_layer_that_was_not_traced_is_the_reason_for_no_rows(
 def test_an_empty_answer_says_whether_what_it_reads_was_recorded(
     connection: duckdb.DuckDBPyConnection, note: str, table: str, missing: str
 ) -> None:
-    connection.execute(f"CREATE TABLE {table} AS SELECT 2 AS run_id")
+    connection.execute(f"INSERT INTO {table} VALUES (2)")
     connection.execute("CREATE TABLE clock AS SELECT 1 AS run_id")
     noted = header(QUERY.replace("-- param", f"-- note: {note}\n-- param"))
 

@@ -11,7 +11,8 @@ import pytest
 
 from msgflow import Database, UsageError
 from msgflow.record import perf
-from msgflow.record.profile import Rate, read_rate, recorded_samples, with_python_functions
+from msgflow.record.perf import Rate, read_rate, recorded_samples
+from msgflow.record.program import with_python_functions
 from msgflow.trace.perf_script import TEXT
 
 HOGS = """

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from msgflow.record import python_path as module
-from msgflow.record.python_path import PYTHON_NODES, with_python_nodes
+from msgflow.record import program as module
+from msgflow.record.program import PYTHON_NODES, with_python_nodes
 
 FAKE = Path(__file__).with_name("fake_ros")
 # A node with a subscription (7) that spins; what a test does comes in between.

@@ -23,8 +23,8 @@ from typer.testing import CliRunner, Result
 from msgflow.cli.app import app
 from msgflow.database import Database
 from msgflow.record.lttng import losses
+from msgflow.record.perf import SCHEDULER_OPTIONS, why_not
 from msgflow.record.program import Program
-from msgflow.record.scheduling import why_perf_cannot_record
 from msgflow.record.session import can_trace_kernel
 
 
@@ -113,7 +113,7 @@ class TestKernel:
     def _perf(self) -> None:
         if can_trace_kernel():
             pytest.skip("LTTng can trace this kernel")
-        if reason := why_perf_cannot_record():
+        if reason := why_not(SCHEDULER_OPTIONS):
             pytest.skip(reason)
 
     def test_states_of_threads_are_on_the_clock_of_messages(

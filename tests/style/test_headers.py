@@ -18,7 +18,6 @@ from msgflow.cli.query_command import build_command
 from msgflow.database import Database
 from msgflow.db import objects
 from msgflow.query.catalogue import load_query
-from msgflow.query.runner import RESERVED
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
 from msgflow.sql.header import SCHEMAS, Header
 from msgflow.sql.statement import RECORDED, internal_sql
@@ -44,6 +43,8 @@ TABLES = {
     "waited": "main.executor_wait_explained([1])",
     "vertices": "(SELECT 8::BIGINT AS key, 'take' AS kind, 1::BIGINT AS id, 0 AS depth)",
 }
+# What a user chooses for any query, and what recordings have: no query declares these parameters.
+RESERVED = {"runs", "start_ns", "end_ns", *RECORDED}
 # What many statements take; see `msgflow.sql.header`.
 UNDECLARED = {"run", "run_id", "runs", "start_ns", "end_ns", "origin_ns", *RECORDED}
 INTERNAL = [file for file in FILES if file.layer == "internal"]
@@ -144,9 +145,9 @@ def test_parameters_of_a_query_are_those_of_its_sql(
         (statement,) = connection.extract_statements(text)
         used |= statement.named_parameters
     names = {param.name for param in file.header.params}
-    assert names == used - set(RESERVED)
+    assert names == used - RESERVED
     assert "runs" in used
-    assert not names & (common_options() | set(RESERVED))
+    assert not names & (common_options() | RESERVED)
     assert ("start_ns" in used) == ("end_ns" in used) == file.header.has_window
 
 

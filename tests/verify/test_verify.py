@@ -14,9 +14,8 @@ from thorough import few
 from msgflow.database import Database
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
-from msgflow.verify.metrics import SUBJECTS
+from msgflow.verify.metrics import KEYS, SUBJECTS
 from msgflow.verify.verify import Verification
-from msgflow.verify.worst_case import KEYS
 
 Check = Callable[..., Verification]
 # What the golden cases of the queries say of the same system.

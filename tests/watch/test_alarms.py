@@ -29,8 +29,7 @@ from msgflow.verify.verify import Verdict
 from msgflow.watch.alarm import Alarm
 from msgflow.watch.chunk import Chunk
 from msgflow.watch.flight_recorder import FlightRecorder
-from msgflow.watch.kept_chunk import read_chunk
-from msgflow.watch.kept_traces import KeptTraces
+from msgflow.watch.kept_chunk import KeptTraces, read_chunk
 from msgflow.watch.window_report import WindowReport
 from msgflow_sim import Recording, simulate
 

@@ -10,8 +10,7 @@ import pytest
 
 from msgflow.trace import Continuation
 from msgflow.watch.chunk import finished_chunks
-from msgflow.watch.kept_chunk import KeptChunk, read_chunk
-from msgflow.watch.kept_traces import KeptTraces
+from msgflow.watch.kept_chunk import KeptChunk, KeptTraces, read_chunk
 from msgflow_sim import Recording, simulate
 
 STREAM = ["trace_index", "stream_index"]

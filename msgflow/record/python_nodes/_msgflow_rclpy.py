@@ -27,6 +27,12 @@ import weakref
 # More functions than that are no callbacks of a node, but made by it: they share a number.
 _MOST_FUNCTIONS = 10000
 _LONGEST_SYMBOL = 500
+# What rclcpp says of objects with callbacks, all of it with their handle, twice.
+_ANNOUNCED = {
+    "Subscription": ("rclcpp_subscription_init", "rclcpp_subscription_callback_added"),
+    "Timer": ("rclcpp_timer_callback_added",),
+    "Service": ("rclcpp_service_callback_added",),
+}
 _KINDS = {"SingleThreadedExecutor": "single_threaded", "MultiThreadedExecutor": "multi_threaded"}
 
 _is_on = True
@@ -117,15 +123,11 @@ def wrap_executors(executors):
         for kind in ("goal", "cancel", "result"):
             take = functools.partial(_take_answer, "_pending_%s_requests" % kind)
             _wrap(executors._rclpy.ActionClient, "take_%s_response" % kind, take)
-        for name, announce in (
-            ("Subscription", _announce_subscription),
-            ("Timer", _announce_timer),
-            ("Service", _announce_service),
-        ):
+        for name in _ANNOUNCED:
             module = sys.modules["rclpy." + name.lower()]
             # Lyrical: asyncio has others of the same base.
             owner = getattr(module, "Base" + name, None) or getattr(module, name)
-            _wrap(owner, "__init__", functools.partial(_made, announce))
+            _wrap(owner, "__init__", functools.partial(_made, name))
         os.register_at_fork(after_in_child=_begin_anew)
     except Exception as error:
         _turn_off(error)
@@ -197,26 +199,13 @@ def _announce_again():
         _register(owner._msgflow, _symbol(owner.callback))
 
 
-def _announce_subscription(handle):
-    _tracepoints.rclcpp_subscription_init(handle, handle)
-    _tracepoints.rclcpp_subscription_callback_added(handle, handle)
-
-
-def _announce_timer(handle):
-    _tracepoints.rclcpp_timer_callback_added(handle, handle)
-
-
-def _announce_service(handle):
-    _tracepoints.rclcpp_service_callback_added(handle, handle)
-
-
-def _made(announce, original):
+def _made(kind, original):
     def __init__(self, *args, **kwargs):
         original(self, *args, **kwargs)
         if _is_on:
             try:
                 self._msgflow = self.handle.pointer
-                self._msgflow_announce = announce
+                self._msgflow_kind = kind
                 _own(self)
             except Exception as error:
                 _turn_off(error)
@@ -231,7 +220,8 @@ def _own(entity):
         _announce_process()
     callback = entity.callback
     if callback is not None:
-        entity._msgflow_announce(entity._msgflow)
+        for name in _ANNOUNCED[entity._msgflow_kind]:
+            getattr(_tracepoints, name)(entity._msgflow, entity._msgflow)
         _register(entity._msgflow, _symbol(callback))
         _owners[id(callback)] = entity
     entity._msgflow_callback = callback
@@ -492,7 +482,7 @@ def _turn_to(executor, entity):
     handle = getattr(entity, "_msgflow", None)
     if handle is None:
         _look_into(type(entity))
-    elif entity._msgflow_announce is not _announce_service:
+    elif entity._msgflow_kind != "Service":
         _thread.state = "execute"
         _tracepoints.rclcpp_executor_execute(handle)
 

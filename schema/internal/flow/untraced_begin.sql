@@ -1,3 +1,4 @@
+-- kind: inline
 -- description: Topics with such messages, and whether their flows begin with the stamp of each
 --     message, or where its clock may be another one, with its take.
 -- grain: one row per topic

@@ -1,3 +1,4 @@
+-- kind: inline
 -- description: The tracks of rates and of queues.
 -- grain: one row per publisher and subscription
 SELECT publisher_id * 8 + 4 AS track, process_id * 8 + 1 AS parent,

@@ -1,3 +1,4 @@
+-- kind: inline
 -- description: Functions of stacks.
 -- grain: one row per function and file
 SELECT

@@ -1,3 +1,4 @@
+-- kind: inline
 -- description: Names of slices. A slice refers to its name by code and id; id 0 is what is not
 --     known. Calls that a callback waited for have the name of their service; where the trace has
 --     no such service, each client has its own.

@@ -1,3 +1,4 @@
+-- kind: inline
 -- description: Begins and ends of slices of threads and of executors, in the order of each track,
 --     with the links between them. A request whose response a callback waited for lasts until then.
 --     A link begins at the last and ends at the first moment of a

@@ -1,3 +1,4 @@
+-- kind: inline
 -- description: The stacks of samples, the outermost call first.
 -- grain: one row per stack
 SELECT stack_id, list(stack_frame_id ORDER BY position) AS frames

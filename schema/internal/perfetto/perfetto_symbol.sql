@@ -1,3 +1,4 @@
+-- kind: inline
 -- description: Symbols of callbacks, which slices refer to by number.
 -- grain: one row per callback with a symbol
 SELECT callback_id AS id, symbol AS name
