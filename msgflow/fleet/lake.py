@@ -26,6 +26,7 @@ from msgflow.files.text_file import MOST_BYTES
 from msgflow.fleet import layout
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.parquet import read_parquet
+from msgflow.result.query_result import QueryResult
 from msgflow.sql.failure import first_line
 from msgflow.sql.statement import registered
 from msgflow.version import __version__
@@ -40,6 +41,17 @@ FROM known
 QUALIFY row_number() OVER (PARTITION BY run ORDER BY committed_ns DESC) = 1
 ORDER BY run
 """
+
+# Labels as KEY=VALUE, for people.
+_LABELS = """
+nullif(list_transform(map_entries(labels), lambda each: each.key || '=' || each.value), [])
+"""
+_RUNS = f"""
+SELECT run, name, {_LABELS} AS labels, start_ns, end_ns, event_count, source, msgflow_version,
+    seconds, tries, worker, part
+FROM listed
+"""
+_FAILURES = f"SELECT * REPLACE ({_LABELS} AS labels) FROM listed"
 
 
 class Lake:
@@ -238,6 +250,21 @@ class Lake:
             yield
         finally:
             os.close(descriptor)
+
+
+def list_runs(lake: Lake) -> QueryResult:
+    """Return the runs of a lake: the table `run`, with labels as KEY=VALUE."""
+    return _listed(lake.runs(), _RUNS)
+
+
+def list_failures(lake: Lake) -> QueryResult:
+    """Return the failed recordings: the table `fleet_failure`, with labels as KEY=VALUE."""
+    return _listed(lake.failures(), _FAILURES)
+
+
+def _listed(rows: pa.Table, sql: str) -> QueryResult:
+    with open_memory() as con, registered(con, listed=rows):
+        return QueryResult(con.sql(sql).to_arrow_table())
 
 
 def _is_free(store: Store) -> bool:

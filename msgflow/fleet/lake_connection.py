@@ -24,9 +24,8 @@ import pyarrow.parquet as pq
 from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.sql_guard import require_condition
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.layout import RUN, VIEWS, part_path, view_path
-from msgflow.fleet.part import KEY, PART, public_views, view_rows, write_rows
+from msgflow.fleet.part import ANSWERS, KEY, PART, public_views, view_rows, write_rows
 from msgflow.fleet.run_database import run_database
 from msgflow.sql.failure import first_line
 from msgflow.sql.quoting import identifier, literal

@@ -11,9 +11,9 @@ import pyarrow.compute as pc
 
 from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
+from msgflow.fleet.lake import list_failures
 from msgflow.fleet.lake_connection import Reading, choose, lake_errors
 from msgflow.fleet.lake_query import fleet_query, header_of, statements
-from msgflow.fleet.listing import list_failures
 from msgflow.result.query_result import QueryResult
 from msgflow.text.shell import shell_quoted
 from msgflow.view.assets import single_page

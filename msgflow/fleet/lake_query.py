@@ -20,9 +20,9 @@ import pyarrow as pa
 
 from msgflow.database import guarded_rows, sql_error
 from msgflow.errors import DatabaseError, QueryError, UsageError
-from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.lake_connection import Reading, choose, lake_errors, what_there_is
 from msgflow.fleet.layout import VIEWS
+from msgflow.fleet.part import ANSWERS
 from msgflow.query.catalogue import choose_query, load_query, queries_meant
 from msgflow.query.runner import bind, shown_rows
 from msgflow.query.selection import make_selection, selected, values_of

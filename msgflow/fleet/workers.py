@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from msgflow.errors import UsageError
-from msgflow.fleet.task import Outcome, Reason, Task
-from msgflow.fleet.task_process import run_task
+from msgflow.fleet.task import Outcome, Reason, Task, run_task
 from msgflow.sql.failure import first_line
 
 LOCAL = "local"

@@ -23,7 +23,8 @@ from typer.testing import CliRunner, Result
 from msgflow import Database
 from msgflow.cli.app import app
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.fleet import child_process, task_process
+from msgflow.fleet import child_process
+from msgflow.fleet import task as task_module
 from msgflow.fleet.ingest import fleet_ingest
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import database_path, part_of, part_path
@@ -222,7 +223,7 @@ def task(filled: Filled) -> Task:
 
 
 def outcome(task: Task, **more: Any) -> Outcome:
-    return task_process.run_task(replace(task, **more))
+    return task_module.run_task(replace(task, **more))
 
 
 def test_what_hangs_or_grows_is_ended(task: Task, tmp_path: Path) -> None:
