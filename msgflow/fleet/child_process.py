@@ -29,6 +29,9 @@ from msgflow.fleet.recording import fetch, look_at
 from msgflow.fleet.task import RESULT, STAGE, Outcome, Reason, Task, without_secrets
 
 _ORPHAN = 1
+# What says that a disk is full.
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+_FULL_WORDS = re.compile("no space left|not enough free|disk quota", re.IGNORECASE)
 
 
 def main() -> None:
@@ -80,7 +83,10 @@ def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[s
         _rename_paths(database, f"{directory / 'source'}/", f"{task.source.rpartition('/')[0]}/")
     enter("looking at the source again")
     if look_at(task.source) != before:
-        raise ChangedError(task.source)
+        raise ChangedError(
+            f"the recording changed while it was read — {task.source}",
+            "ingest it again when it is complete",
+        )
     enter("opening the lake")
     lake = Lake.open(task.lake)
     enter("writing")
@@ -103,7 +109,7 @@ def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[s
     }
 
 
-class ChangedError(Exception):
+class ChangedError(MsgflowError):
     """The source changed during the ingest."""
 
 
@@ -138,9 +144,7 @@ def failed_outcome(error: Exception, stage: str) -> Outcome:
     reason = Reason.ERROR
     if isinstance(error, ChangedError):
         reason = Reason.CHANGED
-        message = f"the recording changed while it was read — {error}"
-        hint = "ingest it again when it is complete"
-    elif _is_full(error, message):
+    elif getattr(error, "errno", None) in _FULL or _FULL_WORDS.search(message):
         reason = Reason.NO_SPACE
     elif isinstance(error, MemoryError) or re.search("(?i:out of memory)|more memory", message):
         reason = Reason.TOO_LARGE
@@ -149,18 +153,7 @@ def failed_outcome(error: Exception, stage: str) -> Outcome:
         reason = Reason.BROKEN
     elif isinstance(error, DatabaseError) and "the store" in message:
         reason = Reason.UNREACHABLE
-    return Outcome(
-        reason=reason,
-        stage=stage,
-        error=without_secrets(message),
-        hint=hint and without_secrets(hint),
-    )
-
-
-def _is_full(error: Exception, message: str) -> bool:
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return True
-    return re.search("(?i:no space left|not enough free|disk quota)", message) is not None
+    return Outcome(reason, stage, without_secrets(message), hint and without_secrets(hint))
 
 
 if __name__ == "__main__":

@@ -51,16 +51,10 @@ class Reason(StrEnum):
 
 
 # Another try may succeed although nothing has been changed.
-PASSING = frozenset(
-    {
-        Reason.CHANGED,
-        Reason.UNREACHABLE,
-        Reason.NO_SPACE,
-        Reason.CRASHED,
-        Reason.WORKER_LOST,
-        Reason.ERROR,
-    }
-)
+PASSING = (
+    Reason.CHANGED, Reason.UNREACHABLE, Reason.NO_SPACE, Reason.CRASHED, Reason.WORKER_LOST,
+    Reason.ERROR,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +78,6 @@ class Options:
 class Task(Options):
     """One recording to ingest, with the options of all."""
 
-    index: int  # number of the recording in the call
     source: str  # address of the recording
     lake: str  # address of the lake
     needed_memory: int = 0  # estimated bytes
@@ -95,11 +88,11 @@ class Task(Options):
 class Outcome:
     """The outcome of a task."""
 
-    values: dict[str, Any] | None = None  # columns of the table `run`; None after a failure
     reason: str = ""
     stage: str = ""  # what the task was doing
     error: str = ""  # what went wrong
     hint: str | None = None
+    values: dict[str, Any] | None = None  # columns of the table `run`; None after a failure
     signature: str | None = None  # of the source, if known
     seconds: float = 0.0
     worker: str = ""  # machine and process
@@ -117,10 +110,10 @@ def run_task(task: Task) -> Outcome:
     except OSError as error:
         is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         outcome = Outcome(
-            reason=Reason.NO_SPACE if is_full else Reason.NO_SCRATCH,
-            stage="making scratch space",
-            error=f"{error.strerror or error} — {task.scratch or tempfile.gettempdir()}",
-            hint=f"give a folder {'with free space' if is_full else 'that can be written'} with"
+            Reason.NO_SPACE if is_full else Reason.NO_SCRATCH,
+            "making scratch space",
+            f"{error.strerror or error} — {task.scratch or tempfile.gettempdir()}",
+            f"give a folder {'with free space' if is_full else 'that can be written'} with"
             " --scratch",
         )
     worker = f"{socket.gethostname()}:{os.getpid()}"
@@ -150,11 +143,8 @@ def _watched(task: Task, directory: Path, end: float) -> Outcome:
                 return _ended(directory, Reason.TIMEOUT, f"not done after {task.timeout:g} s")
             used = _memory(child.pid)
             if task.memory is not None and used > task.memory:
-                return _ended(
-                    directory,
-                    Reason.TOO_LARGE,
-                    f"it took {used:,} bytes of memory, and may take {task.memory:,}",
-                )
+                words = f"it took {used:,} bytes of memory, and may take {task.memory:,}"
+                return _ended(directory, Reason.TOO_LARGE, words)
             time.sleep(_SECONDS_BETWEEN_LOOKS)
     finally:
         with contextlib.suppress(ProcessLookupError, PermissionError):
@@ -178,13 +168,9 @@ def _ended(directory: Path, reason: Reason, words: str) -> Outcome:
         Reason.TOO_LARGE: "allow more with --memory, on a machine that has it",
         Reason.CRASHED: "was there memory enough? --memory keeps a recording below what there is",
     }
-    last = log.splitlines()[-1][-_LONGEST_LOG:] if log else ""
-    return Outcome(
-        reason=reason,
-        stage=stage,
-        error=without_secrets(f"{words}: {last}" if last else words),
-        hint=hints.get(reason),
-    )
+    if log:
+        words += f": {log.splitlines()[-1][-_LONGEST_LOG:]}"
+    return Outcome(reason, stage, without_secrets(words), hints.get(reason))
 
 
 def _memory(pid: int) -> int:

@@ -294,7 +294,7 @@ def test_a_pack_is_refused_while_others_write(place: Path) -> None:
 
 def test_scratch_space_that_cannot_be_made_is_not_full(place: Path) -> None:
     Path("file").write_text("")
-    task = Task(0, str(place), str(place / "lake"), scratch=str(place / "file"))
+    task = Task(str(place), str(place / "lake"), scratch=str(place / "file"))
     found = task_module.run_task(task)
     assert (found.reason, found.stage) == ("no_scratch", "making scratch space")
 

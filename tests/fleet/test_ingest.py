@@ -219,7 +219,7 @@ def test_what_was_mended_is_tried_again(
 
 @pytest.fixture
 def task(filled: Filled) -> Task:
-    return Task(0, str(filled.recordings / "r0"), str(filled.lake), views=False, database=False)
+    return Task(str(filled.recordings / "r0"), str(filled.lake), views=False, database=False)
 
 
 def outcome(task: Task, **more: Any) -> Outcome:
@@ -406,7 +406,7 @@ def test_a_lake_that_cannot_be_reached(filled: Filled, monkeypatch: pytest.Monke
 def test_secrets_are_in_no_text(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "hush-hush")
     assert without_secrets("denied for hush-hush") == "denied for …"
-    given = asdict(Task(0, "s3://bucket/x", "s3://bucket/lake"))
+    given = asdict(Task("s3://bucket/x", "s3://bucket/lake"))
     assert "hush" not in json.dumps(given)
 
 
