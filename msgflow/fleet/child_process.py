@@ -25,7 +25,7 @@ from msgflow.errors import DatabaseError, MsgflowError, TraceError, UsageError
 from msgflow.fleet.file_store import S3
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.part import write_part
-from msgflow.fleet.recording import fetch, look_at
+from msgflow.fleet.sources import fetch, look_at
 from msgflow.fleet.task import RESULT, STAGE, Outcome, Reason, Task, without_secrets
 
 _ORPHAN = 1

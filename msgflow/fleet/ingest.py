@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING, Any
 from msgflow.errors import MsgflowError, TraceError, UsageError
 from msgflow.fleet.file_store import S3, normal_url
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.recording import Recording, look_at
-from msgflow.fleet.sources import find_recordings
+from msgflow.fleet.sources import Recording, find_recordings, look_at
 from msgflow.fleet.task import PASSING, Options, Outcome, Reason, Task, needs, without_secrets
 from msgflow.fleet.workers import make_workers
 
 if TYPE_CHECKING:
-    from msgflow.fleet.recording import State
+    from msgflow.fleet.sources import State
     from msgflow.fleet.workers import Workers
 
 _LOOKING_AT_ONCE = 8
@@ -234,7 +233,7 @@ class _Ingest:
         self._know(key, row)
         return row
 
-    def _submit(self, workers: Workers, item: _Item, running: dict[int, _Item]) -> None:
+    def _submit(self, workers: Workers, item: _Item, running: dict[str, _Item]) -> None:
         options = self._options
         source = item.recording.source
         assert item.state is not None

@@ -25,7 +25,7 @@ from msgflow.errors import DatabaseError, UsageError
 from msgflow.files.text_file import MOST_BYTES
 from msgflow.fleet import layout
 from msgflow.fleet.file_store import Store
-from msgflow.fleet.parquet import read_parquet
+from msgflow.fleet.layout import read_parquet
 from msgflow.result.query_result import QueryResult
 from msgflow.sql.failure import first_line
 from msgflow.sql.statement import registered

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -122,11 +122,7 @@ def fleet_query(
         _require_tables(reading, header)
         grouped = _group(con, choice, header, group_by)
         sql, bindings = selected(grouped, chosen, internal)
-
-        def ask() -> Any:
-            return con.sql(sql, params=own | bindings).to_arrow_table()
-
-        table = _asked(lake, name, con, ask)
+        table = _asked(lake, name, con, lambda: con.sql(sql, params=own | bindings))
     table, missing, _ = shown_rows(table, internal=internal)
     notes = []
     if len(choice.runs) < choice.total:
@@ -176,9 +172,7 @@ def fleet_worst(
         con = reading.connection
         _require_tables(reading, header)
         values = {"path": path, "count": limit}
-        table = _asked(
-            lake, WORST, con, lambda: statements().run(con, WORST, values).to_arrow_table()
-        )
+        table = _asked(lake, WORST, con, lambda: statements().run(con, WORST, values))
     if not len(table):
         raise UsageError(
             f"no flow of these runs reached the end of a path with this text — {path}",
@@ -278,10 +272,15 @@ def _text(header: Header) -> str:
     return statements().text(header.name).rstrip().rstrip(";")
 
 
-def _asked(lake: Lake, name: str, con: duckdb.DuckDBPyConnection, ask: Any) -> Any:
+def _asked(
+    lake: Lake,
+    name: str,
+    con: duckdb.DuckDBPyConnection,
+    ask: Callable[[], duckdb.DuckDBPyRelation],
+) -> pa.Table:
     try:
         with lake_errors(lake, is_query=True):
-            return interruptible(con, ask, only_reads=True)
+            return interruptible(con, lambda: ask().to_arrow_table(), only_reads=True)
     except duckdb.Error as error:
         lacking = _LACKING.search(str(error))
         if lacking is not None and name in names():

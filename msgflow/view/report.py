@@ -28,9 +28,9 @@ from msgflow.view.summary import (
     change_section,
     encoded_comparison,
     encoded_section,
+    markdown,
     verdict_section,
 )
-from msgflow.view.summary_markdown import markdown
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:

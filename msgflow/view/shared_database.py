@@ -90,7 +90,6 @@ class Answers:
 
     generation: str  # of that state, see `generation_of`
     pages: Pages  # answer questions
-    turns: Turns  # of questions
 
 
 class SharedDatabase:
@@ -100,15 +99,14 @@ class SharedDatabase:
         self.path = path
         self._memory_limit = memory_limit
         self._changed = threading.Condition()
+        self._turns = Turns()
         self._cursors: set[duckdb.DuckDBPyConnection] = set()
         self._answers: Answers | None = None
         # A connection, which those of questions are made of; None while it is closed.
         self._base: duckdb.DuckDBPyConnection | None = None
-        self._asked_at = time.monotonic()
-        self._is_closed = False
+        # Closes it when no question was asked for a while.
+        self._idle = threading.Timer(SECONDS_UNTIL_FREE, self._free_if_idle)
         self._open()
-        self._idle = threading.Thread(target=self._free_when_idle, daemon=True)
-        self._idle.start()
 
     def generation(self) -> str:
         """Return the generation of the database as it is now, which is opened for it."""
@@ -149,7 +147,7 @@ class SharedDatabase:
         params: dict[str, Any],
     ) -> bytes:
         try:
-            content = answers.turns.ask(lambda: answers.pages.answer(cursor, name, params))
+            content = self._turns.ask(lambda: answers.pages.answer(cursor, name, params))
         except (MsgflowError, duckdb.Error):
             if not self._is(answers.generation):  # then it was interrupted, or read another file
                 raise self._replaced() from None
@@ -158,16 +156,18 @@ class SharedDatabase:
             with self._changed:
                 cursor.close()
                 self._cursors.discard(cursor)
-                self._asked_at = time.monotonic()
                 self._changed.notify_all()
+                self._idle.cancel()
+                self._idle = threading.Timer(SECONDS_UNTIL_FREE, self._free_if_idle)
+                self._idle.daemon = True
+                self._idle.start()
         if not self._is(answers.generation):  # written in its place, it can be a part of each
             raise self._replaced()
         return content
 
     def _current(self) -> tuple[Answers, duckdb.DuckDBPyConnection]:
         # A process has a file of one name open once: the old one is closed before the new one.
-        self._asked_at = time.monotonic()
-        end = self._asked_at + _MOST_SECONDS_TO_END
+        end = time.monotonic() + _MOST_SECONDS_TO_END
         while self._answers is None or self._base is None or not self._is(self._answers.generation):
             if self._cursors:
                 if time.monotonic() > end:
@@ -200,7 +200,7 @@ class SharedDatabase:
         )
         if self._answers is None or self._answers.generation != generation:
             self._forget()
-            self._answers = Answers(generation, Pages(), Turns())
+            self._answers = Answers(generation, Pages())
         ahead = [self._answers, self._new_cursor(self._base)]
         threading.Thread(target=self._ask_ahead, args=ahead, daemon=True).start()
 
@@ -213,18 +213,10 @@ class SharedDatabase:
         with suppress(MsgflowError, duckdb.Error):
             self._answer(answers, cursor, "segments", {})
 
-    def _free_when_idle(self) -> None:
+    def _free_if_idle(self) -> None:
         with self._changed:
-            while not self._is_closed:
-                self._changed.wait(self._seconds_until_free())
-                if self._seconds_until_free() == 0:
-                    self._free()
-
-    def _seconds_until_free(self) -> float | None:
-        """Return in how many seconds to look again, 0 to close it, None to wait for a change."""
-        if self._base is None or self._cursors:
-            return None
-        return max(self._asked_at + SECONDS_UNTIL_FREE - time.monotonic(), 0)
+            if not self._cursors:
+                self._free()
 
     def _free(self) -> None:
         if self._base is not None:
@@ -259,13 +251,11 @@ class SharedDatabase:
         with self._changed:
             while self._cursors and time.monotonic() < end:
                 self._end_questions()
-            self._is_closed = True
-            self._changed.notify_all()
+            self._idle.cancel()
             # Now and then an interrupt leaves a query of DuckDB that only the process ends.
             if not self._cursors:
                 self._free()
             self._forget()
-        self._idle.join()
 
 
 def generation_of(path: Path) -> str:

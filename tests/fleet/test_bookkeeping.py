@@ -28,7 +28,7 @@ from msgflow.fleet.ingest import FleetProgress, fleet_ingest, is_in_shard
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import new_part
 from msgflow.fleet.pack import pack
-from msgflow.fleet.recording import look_at
+from msgflow.fleet.sources import look_at
 from msgflow.fleet.task import Options, Outcome, Task
 
 BROKEN = "broken"

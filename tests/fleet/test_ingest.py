@@ -29,7 +29,7 @@ from msgflow.fleet.ingest import fleet_ingest
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import database_path, part_of, part_path
 from msgflow.fleet.pack import pack
-from msgflow.fleet.recording import State
+from msgflow.fleet.sources import State
 from msgflow.fleet.task import PASSING, Options, Outcome, Task, needs, without_secrets
 from msgflow.fleet.workers import OneProcess
 from msgflow.sql.failure import out_of_memory
