@@ -72,7 +72,11 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
     failures = list_failures(lake).table
     failed = f"msgflow fleet failures --lake {shell_quoted(lake.store.url)}"
     parts["page_failure?"] = encode(_with_time(failures), meta={"command": failed})
-    parts["run"] = encode(_frame(lake, tables["page_run"]))
+    name = lake.store.url.rstrip("/").rpartition("/")[2] or lake.store.url
+    # The row that the head of a page shows; here it names the lake.
+    parts["run"] = encode(
+        pa.table({"run_id": [0], "name": [name], "start_text": ["0"], "runs": [len(choice.runs)]})
+    )
     head: dict[str, Any] = {
         "notes": notes,
         "pages": ["lake"],
@@ -109,9 +113,3 @@ def _with_time(failures: pa.Table) -> pa.Table:
     texts = pc.strftime(pc.cast(moments, pa.timestamp("s"), safe=False), "%Y-%m-%d %H:%M:%S")
     names = ["source", "reason", "error", "hint", "labels", "stage", "tries", "worker"]
     return failures.select(names).add_column(1, "failed", texts)
-
-
-def _frame(lake: Lake, runs: pa.Table) -> pa.Table:
-    """Return the row that the head of a page shows; here it names the lake."""
-    name = lake.store.url.rstrip("/").rpartition("/")[2] or lake.store.url
-    return pa.table({"run_id": [0], "name": [name], "start_text": ["0"], "runs": [len(runs)]})

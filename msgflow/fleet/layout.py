@@ -138,7 +138,6 @@ def read_parquet(content: bytes, schema: pa.Schema | None = None) -> pa.Table:
 
 
 def _schema(*columns: tuple[str, pa.DataType, str]) -> pa.Schema:
-    """Return columns, each with its meaning."""
     return pa.schema(
         [pa.field(name, kind, metadata={"description": text}) for name, kind, text in columns]
     )

@@ -23,20 +23,14 @@ def kept_token(place: str) -> str:
     It is kept in a file that its user alone can read. A file that others can read or have written
     is replaced. Where nothing can be kept, each call returns another token.
     """
-    with contextlib.suppress(OSError, RuntimeError):  # the last: there is no home directory
-        path = _file(place)
-        return _read(path) or _keep(path, _new())
-    return _new()
-
-
-def _new() -> str:
-    return secrets.token_urlsafe(_BYTES)
-
-
-def _file(place: str) -> Path:
+    token = secrets.token_urlsafe(_BYTES)
     given = os.environ.get("XDG_STATE_HOME")
-    root = Path(given) if given and os.path.isabs(given) else Path("~/.local/state").expanduser()
-    return root / "msgflow" / f"token-{hashlib.sha256(os.fsencode(place)).hexdigest()}"
+    root = Path(given) if given and os.path.isabs(given) else Path("~/.local/state")
+    name = f"token-{hashlib.sha256(os.fsencode(place)).hexdigest()}"
+    with contextlib.suppress(OSError, RuntimeError):  # the last: there is no home directory
+        path = root.expanduser() / "msgflow" / name
+        return _read(path) or _keep(path, token)
+    return token
 
 
 def _read(path: Path) -> str | None:

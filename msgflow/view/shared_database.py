@@ -39,21 +39,20 @@ class Turns:
 
     def ask(self, question: Callable[[], bytes]) -> bytes:
         """Return the answer."""
-        with self._turn(alone=False):
-            answer = _if_memory_suffices(question)
-        if answer is not None:
-            return answer
-        with self._turn(alone=True):
-            answer = _if_memory_suffices(question)
-        if answer is None:
-            raise QueryError(
-                "this takes more memory than the server may use",
-                "start it with more: msgflow ui --memory-limit 8GB",
-            )
-        return answer
+        for alone in (False, True):
+            with self._turn(alone):
+                try:
+                    return question()
+                except (duckdb.OutOfMemoryException, QueryError) as error:
+                    if not isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
+                        raise
+        raise QueryError(
+            "this takes more memory than the server may use",
+            "start it with more: msgflow ui --memory-limit 8GB",
+        )
 
     @contextmanager
-    def _turn(self, *, alone: bool) -> Iterator[None]:
+    def _turn(self, alone: bool) -> Iterator[None]:
         with self._changed:
             self._changed.wait_for(lambda: not self._is_alone and not (alone and self._running))
             self._running += 1
@@ -65,15 +64,6 @@ class Turns:
                 self._running -= 1
                 self._is_alone = False
                 self._changed.notify_all()
-
-
-def _if_memory_suffices(question: Callable[[], bytes]) -> bytes | None:
-    try:
-        return question()
-    except (duckdb.OutOfMemoryException, QueryError) as error:
-        if not isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
-            raise
-    return None
 
 
 class ReplacedError(DatabaseError):
