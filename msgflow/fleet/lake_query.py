@@ -154,10 +154,8 @@ def fleet_sql(
                 return guarded_rows(con, text, "msgflow fleet sql 'FROM run'", limit)
     except duckdb.Error as error:
         said = sql_error(error, "ask about fewer runs with --where")
-        parts = choice.runs.select(["view_part", "database_part"]).to_pylist()
-        if isinstance(error, duckdb.CatalogException) and not any(
-            part for row in parts for part in row.values()
-        ):
+        parts = [*choice.runs["view_part"].to_pylist(), *choice.runs["database_part"].to_pylist()]
+        if isinstance(error, duckdb.CatalogException) and not any(parts):
             said.hint = "these runs have no views: --no-database left them out, and not --views"
         raise said from error
 

@@ -44,7 +44,8 @@ from msgflow.view.sql_page import Sql, encoded_error, encoded_rows, most_rows
 if TYPE_CHECKING:
     from starlette.types import ASGIApp, Receive, Scope, Send
 
-    Started = Callable[["Interruptible"], None]
+    # It is told, when a question starts, how to end that.
+    Started = Callable[[Callable[[], None]], None]
 
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8642
@@ -85,13 +86,6 @@ class Following(Protocol):
         """Put what was prepared in place of the database."""
 
 
-class Interruptible(Protocol):
-    """Something that runs a question, and can be told to end it."""
-
-    def interrupt(self) -> None:
-        """End the question."""
-
-
 def application(
     shared: SharedDatabase, token: str, sql: Sql, following: Following | None = None
 ) -> ASGIApp:
@@ -121,7 +115,7 @@ def application(
     def rows(params: dict[str, Any], generation: str | None, started: Started) -> bytes:
         limit = most_rows(params)
         shared.require(generation)
-        started(sql)
+        started(sql.interrupt)
         try:
             result = sql(params.get("text", ""), limit)
         except (QueryError, UsageError) as error:
@@ -186,7 +180,7 @@ async def _answered(
     request: Request, limiter: anyio.CapacityLimiter, ask: Callable[[Started], bytes]
 ) -> Response:
     """Return the answer; interrupt the question when the browser no longer waits for it."""
-    asked: list[Interruptible] = []
+    interrupts: list[Callable[[], None]] = []
     content: list[bytes] = []
 
     async def watch() -> None:
@@ -194,16 +188,16 @@ async def _answered(
             await anyio.sleep(_SECONDS_BETWEEN_LOOKS)
         # Repeatedly, since between two statements there is nothing to interrupt.
         while True:
-            for one in asked:
+            for interrupt in interrupts:
                 with suppress(duckdb.Error):  # it has just ended
-                    one.interrupt()
+                    interrupt()
             await anyio.sleep(_SECONDS_BETWEEN_LOOKS)
 
     try:
         async with anyio.create_task_group() as group:
             group.start_soon(watch)
             content.append(
-                await anyio.to_thread.run_sync(lambda: ask(asked.append), limiter=limiter)
+                await anyio.to_thread.run_sync(lambda: ask(interrupts.append), limiter=limiter)
             )
             group.cancel_scope.cancel()
     except BaseExceptionGroup as errors:
@@ -211,8 +205,8 @@ async def _answered(
         raise errors.exceptions[0] from None
     except anyio.get_cancelled_exc_class():
         # The server ends, and does not wait for the question.
-        for one in asked:
-            one.interrupt()
+        for interrupt in interrupts:
+            interrupt()
         return PlainTextResponse("error: the server has ended\n", status_code=503)
     return Response(content[0], media_type="application/octet-stream")
 

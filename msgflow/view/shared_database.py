@@ -106,22 +106,24 @@ class SharedDatabase:
     def require(self, generation: str | None) -> None:
         """Raise unless the database is still that of a page."""
         if generation is not None and not self._is(generation):
-            raise self._replaced()
+            raise ReplacedError(
+                f"the database was changed while the page was open — {self.path}",
+                "reload the page to see it as it is now",
+            )
 
     def answer(
         self,
         name: str,
         params: dict[str, Any],
         generation: str | None,
-        started: Callable[[duckdb.DuckDBPyConnection], None],
+        started: Callable[[Callable[[], None]], None],
     ) -> bytes:
-        """Return the answer to a question of a page."""
+        """Return the answer to a question of a page; `started` is told how to end that."""
         with self._changed:
             answers, base = self._current()
-            if generation is not None and generation != answers.generation:
-                raise self._replaced()
+            self.require(generation)
             cursor = self._new_cursor(base)
-        started(cursor)
+        started(cursor.interrupt)
         return self._answer(answers, cursor, name, params)
 
     def _new_cursor(self, base: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnection:
@@ -139,8 +141,7 @@ class SharedDatabase:
         try:
             content = self._turns.ask(lambda: answers.pages.answer(cursor, name, params))
         except (MsgflowError, duckdb.Error):
-            if not self._is(answers.generation):  # then it was interrupted, or read another file
-                raise self._replaced() from None
+            self.require(answers.generation)  # else it was interrupted, or read another file
             raise
         finally:
             with self._changed:
@@ -151,8 +152,7 @@ class SharedDatabase:
                 self._idle = threading.Timer(SECONDS_UNTIL_FREE, self._free_if_idle)
                 self._idle.daemon = True
                 self._idle.start()
-        if not self._is(answers.generation):  # written in its place, it can be a part of each
-            raise self._replaced()
+        self.require(answers.generation)  # written in its place, it can be a part of each
         return content
 
     def _current(self) -> tuple[Answers, duckdb.DuckDBPyConnection]:
@@ -228,12 +228,6 @@ class SharedDatabase:
         for cursor in self._cursors:
             cursor.interrupt()
         self._changed.wait(_SECONDS_BETWEEN_LOOKS)
-
-    def _replaced(self) -> ReplacedError:
-        return ReplacedError(
-            f"the database was changed while the page was open — {self.path}",
-            "reload the page to see it as it is now",
-        )
 
     def close(self) -> None:
         """Close the database."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import pyarrow as pa
 
@@ -56,69 +56,55 @@ _AREA = {
     "callbacks": ("callbacks", "total_ns:desc"),
     "usage": ("executor-usage", "callback_ns:desc"),
 }
-_TITLES = {
-    "why": "What makes data late, or lets them get lost",
-    "callbacks": "Callbacks that began in it",
-    "usage": "What threads did in it",
-    "paths": "Slowest paths",
-    "blame": "Where the time of the slowest flows went",
-    "drops": "What was dropped or lost, and why",
-    "threads": "Busiest threads",
-    "verdicts": "Requirements",
-    "change": "What changed",
-}
-_COLUMNS = {
-    "why": ("sentence",),
-    "callbacks": ("node", "callback", "count", "total_ns", "median_ns", "max_ns"),
-    "usage": ("nodes", "tid", "callback_share", "callback_ns", "take_ns", "select_ns", "wait_ns",
-              "blocked_ns", "unknown_ns"),
-    "paths": ("path", "median_ns", "p99_ns", "max_ns", "reached", "roots"),
-    "blame": ("path", "latency_ns", "node", "duration_ns", "share"),
-    "drops": ("topic_name", "subscriber", "published", "delivered", "dropped", "lost", "reasons"),
-    "threads": ("nodes", "tid", "callback_share", "callback_ns", "callbacks"),
-    "verdicts": ("verdict", "target", "subject", "metric", "condition", "measured", "reason",
-                 "worst_ns"),
-    "change": ("path", "change", "a_median_ns", "b_median_ns", "median_percent", "p95_percent",
-               "max_percent"),
+_NO_FLOW = "No flow reached the end of a path."
+
+
+class Kind(NamedTuple):
+    """What sections of one name are about."""
+
+    title: str
+    when_empty: str  # what to say where there are no rows
+    columns: tuple[str, ...]  # those that matter most
+
+
+_KINDS = {
+    "why": Kind("What makes data late, or lets them get lost", _NO_FLOW, ("sentence",)),
+    "paths": Kind("Slowest paths", _NO_FLOW,
+        ("path", "median_ns", "p99_ns", "max_ns", "reached", "roots")),
+    "blame": Kind("Where the time of the slowest flows went", _NO_FLOW,
+        ("path", "latency_ns", "node", "duration_ns", "share")),
+    "drops": Kind("What was dropped or lost, and why",
+        "Nothing was dropped or lost, as far as the trace tells.",
+        ("topic_name", "subscriber", "published", "delivered", "dropped", "lost", "reasons")),
+    "threads": Kind("Busiest threads", "No thread of an executor ran a callback.",
+        ("nodes", "tid", "callback_share", "callback_ns", "callbacks")),
+    "verdicts": Kind("Requirements", "The file has no requirements.",
+        ("verdict", "target", "subject", "metric", "condition", "measured", "reason", "worst_ns")),
+    "change": Kind("What changed", "No path differs.",
+        ("path", "change", "a_median_ns", "b_median_ns", "median_percent", "p95_percent",
+         "max_percent")),
+    # Of a part of the timeline.
+    "callbacks": Kind("Callbacks that began in it", "No callback of these nodes began in it.",
+        ("node", "callback", "count", "total_ns", "median_ns", "max_ns")),
+    "usage": Kind("What threads did in it", "Nothing is known of these threads in it.",
+        ("nodes", "tid", "callback_share", "callback_ns", "take_ns", "select_ns", "wait_ns",
+         "blocked_ns", "unknown_ns")),
 }  # fmt: skip
-_WHEN_EMPTY = {
-    "why": "No flow reached the end of a path.",
-    "callbacks": "No callback of these nodes began in it.",
-    "usage": "Nothing is known of these threads in it.",
-    "paths": "No flow reached the end of a path.",
-    "blame": "No flow reached the end of a path.",
-    "drops": "Nothing was dropped or lost, as far as the trace tells.",
-    "threads": "No thread of an executor ran a callback.",
-    "verdicts": "The file has no requirements.",
-    "change": "No path differs.",
-}
 
 
 @dataclass(frozen=True)
 class Section:
     """A part of the summary."""
 
-    # 'why', 'paths', 'blame', 'drops', 'threads', 'verdicts' or 'change'; of a part of the timeline
-    # 'callbacks' or 'usage'
-    name: str
+    name: str  # a key of _KINDS
     result: QueryResult  # its rows
     commands: tuple[str, ...]  # print the same numbers
     reading: str = ""  # a line before the rows
 
     @property
-    def title(self) -> str:
+    def kind(self) -> Kind:
         """What it is about."""
-        return _TITLES[self.name]
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Columns that matter most."""
-        return _COLUMNS[self.name]
-
-    @property
-    def when_empty(self) -> str:
-        """What to say where there are no rows."""
-        return _WHEN_EMPTY[self.name]
+        return _KINDS[self.name]
 
 
 def query_section(asked: Question, name: str, through: str = "") -> Section:
@@ -218,10 +204,10 @@ def encoded_comparison(comparison: Comparison, what: str, *, is_quick: bool = Fa
 def encoded_section(section: Section, origin_ns: int) -> bytes:
     """Return a section of the summary as bytes; points in time count from `origin_ns`."""
     meta = {
-        "title": section.title,
+        "title": section.kind.title,
         "reading": section.reading,
-        "when_empty": section.when_empty,
-        "shown": section.columns,
+        "when_empty": section.kind.when_empty,
+        "shown": section.kind.columns,
         "commands": section.commands,
     }
     return encode_result(section.result, meta, origin_ns)
@@ -246,7 +232,7 @@ def markdown(
 
 
 def _section(section: Section) -> Iterator[str]:
-    yield from (f"## {section.title}", "")
+    yield from (f"## {section.kind.title}", "")
     if section.reading:
         # Runs have names of their own.
         reading = code(section.reading) if section.name == "change" else f"{section.reading}."
@@ -255,14 +241,14 @@ def _section(section: Section) -> Iterator[str]:
         lines = {"blame": _flows, "why": _sentences}.get(section.name, _table)
         yield from lines(section)
     elif not section.reading:
-        yield from (section.when_empty, "")
+        yield from (section.kind.when_empty, "")
     if section.commands:
         yield from code_lines(section.commands)
         yield ""
 
 
 def _table(section: Section) -> Iterator[str]:
-    result = section.result.with_columns(section.columns)
+    result = section.result.with_columns(section.kind.columns)
     names, columns, right = cells(result)
     yield markdown_line(names)
     yield rule_line(right)
