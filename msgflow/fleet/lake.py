@@ -275,18 +275,14 @@ def _is_free(store: Store) -> bool:
 
 def _require_sound(rows: pa.Table, name: str, url: str) -> None:
     """Raise unless rows of the table `run` have what their order and their files depend on."""
-    lacking = [column for column in ("run", "committed_ns") if rows[column].null_count]
-    names = {key: [each for each in rows[key].to_pylist() if each is not None] for key in _NAMES}
-    unfit = [key for key in _NAMES if any("/" in each for each in names[key])]
-    if lacking:
-        what = f"a row without {lacking[0]}"
-    elif unfit:
-        what = f"a {unfit[0]} that is no name"
-    elif name != layout.PACKED and names["run"] != [name]:
-        what = "a file with another name than its run"
-    else:
-        return
-    raise DatabaseError(
-        f"cannot read the runs of the lake: {what} — {url}",
-        "delete this file; the recordings of its runs have to be ingested again",
-    )
+    wrong = [f"a row without {each}" for each in ("run", "committed_ns") if rows[each].null_count]
+    for key in _NAMES:
+        if any("/" in each for each in rows[key].to_pylist() if each is not None):
+            wrong.append(f"a {key} that is no name")
+    if name != layout.PACKED and rows["run"].to_pylist() != [name]:
+        wrong.append("a file with another name than its run")
+    if wrong:
+        raise DatabaseError(
+            f"cannot read the runs of the lake: {wrong[0]} — {url}",
+            "delete this file; the recordings of its runs have to be ingested again",
+        )

@@ -85,8 +85,6 @@ def write_part(
         with file.open("rb") as source, pa.CompressedOutputStream(str(compressed), "zstd") as sink:
             shutil.copyfileobj(source, sink, 1 << 20)
         store.put(database_path(part), compressed)
-    for written in (table, compressed):
-        written.unlink(missing_ok=True)
     return {
         KEY: key,
         PART: part,

@@ -52,6 +52,8 @@ DEFAULT_PORT = 8642
 # Questions that are answered at the same time; the others wait.
 MOST_AT_ONCE = 4
 _SECONDS_BETWEEN_LOOKS = 0.1
+# SQL has one process, and keeps no page waiting; nor does the next state.
+_ALONE = ("sql", "prepare", "show")
 _NOT_HERE = "this server answers for this machine alone"
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:;"
@@ -123,35 +125,29 @@ def application(
         shared.require(generation)
         return encoded_rows(result)
 
-    def prepare() -> bytes:
-        assert following is not None
-        following.prepare()
-        return b""
-
-    def show() -> bytes:
-        assert following is not None
-        following.show()
-        return shared.generation().encode()
+    def answer(
+        name: str, params: dict[str, Any], generation: str | None, started: Started
+    ) -> bytes:
+        if name == "sql":
+            return rows(params, generation, started)
+        if following is not None and name == "prepare":
+            following.prepare()
+            return b""
+        if following is not None and name == "show":
+            following.show()
+            return shared.generation().encode()
+        return shared.answer(name, params, generation, started)
 
     async def data(request: Request) -> Response:
         name = request.path_params["name"]
         params: dict[str, Any] = dict(request.query_params)
         generation = request.headers.get("X-Generation")
-        # SQL has one process, and keeps no page waiting; nor does the next state.
-        alone: dict[str, Callable[[Started], bytes]] = {
-            "sql": lambda started: rows(params, generation, started)
-        }
-        if following is not None:
-            alone |= {"prepare": lambda _: prepare(), "show": lambda _: show()}
-        kind = name if name in alone else ""
+        kind = name if name in _ALONE else ""
         if kind not in limiters:
             limiters[kind] = anyio.CapacityLimiter(1 if kind else MOST_AT_ONCE)
         try:
-            return await _answered(
-                request,
-                limiters[kind],
-                alone.get(name, lambda started: shared.answer(name, params, generation, started)),
-            )
+            ask = partial(answer, name, params, generation)
+            return await _answered(request, limiters[kind], ask)
         except MsgflowError as error:
             return _failure(error)
         except duckdb.Error as error:
