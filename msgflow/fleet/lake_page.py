@@ -13,7 +13,7 @@ from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
 from msgflow.fleet.lake import list_failures
 from msgflow.fleet.lake_connection import Reading, choose, lake_errors
-from msgflow.fleet.lake_query import fleet_query, header_of, statements
+from msgflow.fleet.lake_query import STATEMENTS, fleet_query, header_of
 from msgflow.result.query_result import QueryResult
 from msgflow.text.shell import shell_quoted
 from msgflow.view.assets import single_page
@@ -48,11 +48,11 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
     option += f" --where {shell_quoted(where)}" if where else ""
     with Reading(choice, ["flow"]) as reading, lake_errors(lake, is_query=True):
         tables = {
-            name: statements().run(reading.connection, name, {"count": 10}).to_arrow_table()
+            name: STATEMENTS.run(reading.connection, name, {"count": 10}).to_arrow_table()
             for name in _STATEMENTS
         }
     for name, table in tables.items():
-        parts[f"{name}?"] = _encoded(QueryResult(table, statements().header(name)))
+        parts[f"{name}?"] = _encoded(QueryResult(table, STATEMENTS.header(name)))
     result = fleet_query(lake, _LATENCY, where=where)
     command = f"msgflow fleet query {_LATENCY} {option}"
     parts["page_path?"] = _encoded(result, command=command)

@@ -50,12 +50,7 @@ _LISTS = re.compile(
 # DuckDB says this of a statement when files have other columns.
 _LACKING = re.compile(r'does not have a column named "(\w+)"')
 _BUCKETS = "distributed"
-
-
-@cache
-def statements() -> Statements:
-    """Return the statements below `sql`."""
-    return Statements(Path(__file__).parent / "sql")
+STATEMENTS = Statements(Path(__file__).parent / "sql")
 
 
 @cache
@@ -63,8 +58,8 @@ def names() -> tuple[str, ...]:
     """Return the names of the queries that a lake answers, sorted."""
     return tuple(
         name.replace("_", "-")
-        for name in statements().names()
-        if any(column.name == GROUP for column in statements().header(name).columns)
+        for name in STATEMENTS.names()
+        if any(column.name == GROUP for column in STATEMENTS.header(name).columns)
     )
 
 
@@ -89,7 +84,7 @@ def header_of(name: str, given: Mapping[str, Value] | None = None) -> Header:
             f"it answers {', '.join(_words())}; for others: msgflow fleet open RUN, then"
             f" {query.command}",
         )
-    header = statements().header(query.name.replace("-", "_"))
+    header = STATEMENTS.header(query.name.replace("-", "_"))
     return replace(
         header, chosen=query.words, params=(*variants, *header.params), variants=variants
     )
@@ -164,13 +159,13 @@ def fleet_worst(
     lake: Lake, path: str, *, where: str | None = None, limit: int = DEFAULT_LIMIT
 ) -> QueryResult:
     """Return the slowest flows of a path, each with the command that opens it."""
-    header = statements().header(WORST)
+    header = STATEMENTS.header(WORST)
     choice = choose(lake, where)
     with Reading(choice, _tables(header)) as reading:
         con = reading.connection
         _require_tables(reading, header)
         values = {"path": path, "count": limit}
-        table = _asked(lake, WORST, con, lambda: statements().run(con, WORST, values))
+        table = _asked(lake, WORST, con, lambda: STATEMENTS.run(con, WORST, values))
     if not len(table):
         raise UsageError(
             f"no flow of these runs reached the end of a path with this text — {path}",
@@ -201,7 +196,7 @@ def _command(lake: Lake, row: Mapping[str, Any]) -> str | None:
 
 
 def _tables(header: Header) -> list[str]:
-    read = relations_of(statements().text(header.name))
+    read = relations_of(STATEMENTS.text(header.name))
     return sorted(read.intersection(ANSWERS))
 
 
@@ -249,25 +244,21 @@ def _group(
     number = f"dense_rank() OVER (ORDER BY {', '.join(values)})" if values else "1::BIGINT"
     rows = con.sql(f"SELECT run, {number} AS {GROUP} FROM run", params=bound)
     con.register("run_group", rows.to_arrow_table())
+    kept = tuple(column for column in header.columns if column.name != GROUP)
+    text = STATEMENTS.text(header.name).rstrip().rstrip(";")
     if not columns:
-        kept = tuple(column for column in header.columns if column.name != GROUP)
-        body = f"SELECT * EXCLUDE ({GROUP}) FROM (\n{_text(header)}\n)"
+        body = f"SELECT * EXCLUDE ({GROUP}) FROM (\n{text}\n)"
         return replace(header, columns=kept, body=body)
     labels = con.sql(f"SELECT DISTINCT {number} AS {GROUP}{listed} FROM run", params=bound)
     con.register("group_label", labels.to_arrow_table())
     body = (
         "SELECT l.* EXCLUDE (label_group), q.* EXCLUDE (label_group, place) FROM ("
-        f"SELECT row_number() OVER () AS place, * FROM (\n{_text(header)}\n)) AS q "
+        f"SELECT row_number() OVER () AS place, * FROM (\n{text}\n)) AS q "
         f"JOIN group_label AS l ON q.{GROUP} = l.{GROUP} ORDER BY q.place"
     )
-    kept = tuple(column for column in header.columns if column.name != GROUP)
     first = tuple(column.name for column in columns)
     brief = (*header.brief[:1], *first, *header.brief[1:])
     return replace(header, columns=(*columns, *kept), body=body, brief=brief)
-
-
-def _text(header: Header) -> str:
-    return statements().text(header.name).rstrip().rstrip(";")
 
 
 def _asked(
