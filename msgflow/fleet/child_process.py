@@ -69,7 +69,9 @@ def do(task: Task, directory: Path) -> Outcome:
 def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[str, Any]:
     enter("looking at the source")
     before = look_at(task.source)
-    _require_space(task, directory)
+    if (free := shutil.disk_usage(directory).free) < task.needed_disk:
+        words = f"some {task.needed_disk:,} bytes of scratch space are needed, {free:,} are free"
+        raise OSError(errno.ENOSPC, words)
     path = Path(task.source)
     if task.source.startswith(S3):
         enter("fetching")
@@ -111,13 +113,6 @@ def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[s
 
 class ChangedError(MsgflowError):
     """The source changed during the ingest."""
-
-
-def _require_space(task: Task, directory: Path) -> None:
-    free = shutil.disk_usage(directory).free
-    if free < task.needed_disk:
-        words = f"some {task.needed_disk:,} bytes of scratch space are needed, {free:,} are free"
-        raise OSError(errno.ENOSPC, words)
 
 
 def _rename_paths(database: Path, before: str, after: str) -> None:
