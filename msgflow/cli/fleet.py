@@ -145,7 +145,7 @@ def _print_report(report: FleetProgress, lake: str, quiet: bool) -> None:
 @operation
 def runs(*, lake: str, **shown: Unpack[Shown]) -> None:
     """List the runs of a lake."""
-    from msgflow.fleet.listing import list_runs
+    from msgflow.fleet.lake import list_runs
 
     print_result(list_runs(_opened(lake)), **shown)
 
@@ -154,7 +154,7 @@ def runs(*, lake: str, **shown: Unpack[Shown]) -> None:
 @operation
 def failures(*, lake: str, **shown: Unpack[Shown]) -> None:
     """List the recordings that did not go into a lake, and why."""
-    from msgflow.fleet.listing import list_failures
+    from msgflow.fleet.lake import list_failures
 
     print_result(list_failures(_opened(lake)), **shown)
 

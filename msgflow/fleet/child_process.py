@@ -25,10 +25,13 @@ from msgflow.errors import DatabaseError, MsgflowError, TraceError, UsageError
 from msgflow.fleet.file_store import S3
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.part import write_part
-from msgflow.fleet.recording import fetch, look_at
+from msgflow.fleet.sources import fetch, look_at
 from msgflow.fleet.task import RESULT, STAGE, Outcome, Reason, Task, without_secrets
 
 _ORPHAN = 1
+# What says that a disk is full.
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+_FULL_WORDS = re.compile("no space left|not enough free|disk quota", re.IGNORECASE)
 
 
 def main() -> None:
@@ -66,7 +69,9 @@ def do(task: Task, directory: Path) -> Outcome:
 def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[str, Any]:
     enter("looking at the source")
     before = look_at(task.source)
-    _require_space(task, directory)
+    if (free := shutil.disk_usage(directory).free) < task.needed_disk:
+        words = f"some {task.needed_disk:,} bytes of scratch space are needed, {free:,} are free"
+        raise OSError(errno.ENOSPC, words)
     path = Path(task.source)
     if task.source.startswith(S3):
         enter("fetching")
@@ -80,7 +85,10 @@ def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[s
         _rename_paths(database, f"{directory / 'source'}/", f"{task.source.rpartition('/')[0]}/")
     enter("looking at the source again")
     if look_at(task.source) != before:
-        raise ChangedError(task.source)
+        raise ChangedError(
+            f"the recording changed while it was read — {task.source}",
+            "ingest it again when it is complete",
+        )
     enter("opening the lake")
     lake = Lake.open(task.lake)
     enter("writing")
@@ -103,15 +111,8 @@ def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[s
     }
 
 
-class ChangedError(Exception):
+class ChangedError(MsgflowError):
     """The source changed during the ingest."""
-
-
-def _require_space(task: Task, directory: Path) -> None:
-    free = shutil.disk_usage(directory).free
-    if free < task.needed_disk:
-        words = f"some {task.needed_disk:,} bytes of scratch space are needed, {free:,} are free"
-        raise OSError(errno.ENOSPC, words)
 
 
 def _rename_paths(database: Path, before: str, after: str) -> None:
@@ -138,9 +139,7 @@ def failed_outcome(error: Exception, stage: str) -> Outcome:
     reason = Reason.ERROR
     if isinstance(error, ChangedError):
         reason = Reason.CHANGED
-        message = f"the recording changed while it was read — {error}"
-        hint = "ingest it again when it is complete"
-    elif _is_full(error, message):
+    elif getattr(error, "errno", None) in _FULL or _FULL_WORDS.search(message):
         reason = Reason.NO_SPACE
     elif isinstance(error, MemoryError) or re.search("(?i:out of memory)|more memory", message):
         reason = Reason.TOO_LARGE
@@ -149,18 +148,7 @@ def failed_outcome(error: Exception, stage: str) -> Outcome:
         reason = Reason.BROKEN
     elif isinstance(error, DatabaseError) and "the store" in message:
         reason = Reason.UNREACHABLE
-    return Outcome(
-        reason=reason,
-        stage=stage,
-        error=without_secrets(message),
-        hint=hint and without_secrets(hint),
-    )
-
-
-def _is_full(error: Exception, message: str) -> bool:
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return True
-    return re.search("(?i:no space left|not enough free|disk quota)", message) is not None
+    return Outcome(reason, stage, without_secrets(message), hint and without_secrets(hint))
 
 
 if __name__ == "__main__":

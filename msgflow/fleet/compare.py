@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pyarrow as pa
 
 from msgflow.errors import UsageError
-from msgflow.fleet.lake_connection import Choice, Reading, choose
+from msgflow.fleet.lake_connection import Reading, choose
 from msgflow.query.compare import runs_compared, share_of
 from msgflow.query.differences import STATISTICS, Differences
 from msgflow.query.selection import CASES, CUT_COLUMN
@@ -55,8 +55,14 @@ def compare(
     if case not in CASES:
         raise UsageError(f"there is no such case — {case}", f"choose one of {', '.join(CASES)}")
     choice = choose(lake, where)
+    known_labels = ", ".join(choice.labels)
+    have = f"the labels are {known_labels}" if known_labels else "there are no labels"
     for key in (by, unit):
-        _require_label(choice, key)
+        if key is not None and key not in choice.labels:
+            raise UsageError(
+                f"no run of the lake has such a label — {key}",
+                meant_or(nearest(key, choice.labels), have, "?"),
+            )
     labels = [dict(pairs or ()) for pairs in choice.runs["labels"].to_pylist()]
     known = Counter(each[by] for each in labels if by in each)
     base, other = _sides(by, known, base, other)
@@ -82,16 +88,6 @@ def compare(
     result.notes.extend(_one_sided(paths, by))
     result.notes.extend(_doubts(rows, paths, confidence))
     return Differences(result=result, all_paths=_ALL_PATHS)
-
-
-def _require_label(choice: Choice, key: str | None) -> None:
-    if key is None or key in choice.labels:
-        return
-    have = f"the labels are {', '.join(choice.labels)}" if choice.labels else "there are no labels"
-    raise UsageError(
-        f"no run of the lake has such a label — {key}",
-        meant_or(nearest(key, choice.labels), have, "?"),
-    )
 
 
 def _sides(

@@ -22,13 +22,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 from urllib.parse import urlsplit
 
-from pyarrow.fs import (
-    AwsStandardS3RetryStrategy,
-    FileSelector,
-    FileType,
-    LocalFileSystem,
-    S3FileSystem,
-)
+from pyarrow import fs
 
 from msgflow.errors import DatabaseError, UsageError, require_utf8
 from msgflow.files.temporary_owner import mark
@@ -92,7 +86,7 @@ class Store:
     @cached_property
     def filesystem(self) -> Any:
         """The `pyarrow.fs.FileSystem`; `full` gives its paths."""
-        return LocalFileSystem() if self.is_local else _s3()
+        return fs.LocalFileSystem() if self.is_local else _s3()
 
     def full(self, path: str = "") -> str:
         """Return the path of a file in `filesystem`."""
@@ -144,30 +138,21 @@ class Store:
 
     def entries(self, path: str = "", *, recursive: bool = True) -> list[Entry]:
         """Return the files below a path, sorted; an empty list if there is no such path."""
-        files = self._found(path, FileType.File, recursive=recursive)
-        if self.is_local and not self._follows_links:
-            folders = {info.path.rpartition("/")[0] for info in files}
-            here = {each for each in folders if not self._is_elsewhere(self._below(each))}
-            files = [
-                info
-                for info in files
-                if info.path.rpartition("/")[0] in here and not os.path.islink(info.path)
-            ]
-        return sorted(
-            (Entry(self._below(info.path), info.size, info.mtime_ns or 0) for info in files),
-            key=lambda entry: entry.path,
-        )
-
-    def _below(self, full: str) -> str:
-        return full[len(self._root.rstrip("/")) + 1 :]
+        above = len(self._root.rstrip("/")) + 1
+        found = [
+            Entry(info.path[above:], info.size, info.mtime_ns or 0)
+            for info in self._found(path, fs.FileType.File, recursive=recursive)
+        ]
+        here = [entry for entry in found if not self._is_elsewhere(entry.path)]
+        return sorted(here, key=lambda entry: entry.path)
 
     def folders(self, path: str = "") -> list[str]:
         """Return the names of the folders directly below a path, sorted."""
-        return sorted(info.base_name for info in self._found(path, FileType.Directory))
+        return sorted(info.base_name for info in self._found(path, fs.FileType.Directory))
 
     def _found(self, path: str, kind: Any, *, recursive: bool = False) -> list[Any]:
         """Return what pyarrow says of the files or folders below a path."""
-        selector = FileSelector(self.full(path), allow_not_found=True, recursive=recursive)
+        selector = fs.FileSelector(self.full(path), allow_not_found=True, recursive=recursive)
         found = self._patiently(lambda: self.filesystem.get_file_info(selector))
         return [info for info in found if info.type == kind]
 
@@ -175,9 +160,8 @@ class Store:
         """Return the entry of one file, None if there is no such file."""
         self._require_here(path)
         info = self._patiently(lambda: self.filesystem.get_file_info(self.full(path)))
-        if info.type != FileType.File:
-            return None
-        return Entry(path, info.size, info.mtime_ns or 0)
+        is_file = info.type == fs.FileType.File
+        return Entry(path, info.size, info.mtime_ns or 0) if is_file else None
 
     def read(self, path: str, most: int | None = None) -> bytes | None:
         """Return the content of a small file, None if there is no such file."""
@@ -279,11 +263,9 @@ def normal_url(url: str | Path) -> str:
         raise UsageError(
             f"neither a folder nor a bucket — {text}", "give a path, or s3://BUCKET/PREFIX"
         )
-    if "?" in rest or not rest.partition("/")[0]:
-        raise UsageError(f"no address of a bucket — {text}", "s3://BUCKET/PREFIX")
     # `..` in a manifest means the same as in a folder.
     path = posixpath.normpath(rest)
-    if path.startswith("."):
+    if "?" in rest or not rest.partition("/")[0] or path.startswith("."):
         raise UsageError(f"no address of a bucket — {text}", "s3://BUCKET/PREFIX")
     return S3 + path
 
@@ -303,8 +285,8 @@ def _s3() -> Any:
     region = os.environ.get("AWS_REGION") or os.environ.get("AWS_DEFAULT_REGION")
     if region:
         options["region"] = region
-    return S3FileSystem(
-        retry_strategy=AwsStandardS3RetryStrategy(max_attempts=MOST_ATTEMPTS),
+    return fs.S3FileSystem(
+        retry_strategy=fs.AwsStandardS3RetryStrategy(max_attempts=MOST_ATTEMPTS),
         connect_timeout=_CONNECT_SECONDS,
         request_timeout=_REQUEST_SECONDS,
         **options,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import heapq
 import json
 import random
 import time
@@ -17,13 +16,12 @@ from typing import TYPE_CHECKING, Any
 from msgflow.errors import MsgflowError, TraceError, UsageError
 from msgflow.fleet.file_store import S3, normal_url
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.recording import Recording, look_at
-from msgflow.fleet.sources import find_recordings
+from msgflow.fleet.sources import Recording, find_recordings, look_at
 from msgflow.fleet.task import PASSING, Options, Outcome, Reason, Task, needs, without_secrets
 from msgflow.fleet.workers import make_workers
 
 if TYPE_CHECKING:
-    from msgflow.fleet.recording import State
+    from msgflow.fleet.sources import State
     from msgflow.fleet.workers import Workers
 
 _LOOKING_AT_ONCE = 8
@@ -114,10 +112,10 @@ def is_in_shard(source: str, shard: int, shards: int) -> bool:
 class _Item:
     """A recording in progress."""
 
-    index: int
     recording: Recording
     state: State | None = None
     tries: int = 0
+    pause_end: float = 0.0  # when to try it again, as `time.monotonic` says it
 
 
 @dataclass
@@ -144,22 +142,16 @@ class _Ingest:
         self._written: set[str] = set()
         self._alike: dict[str, Mapping[str, Any]] = {}
         self._failed = {row["source"]: row for row in self._lake.failures().to_pylist()}
-        # (when, index, item): recordings to try again after a pause.
-        self._paused: list[tuple[float, int, _Item]] = []
+        # To try again after a pause.
+        self._paused: list[_Item] = []
 
     def run(self, ray: str | None) -> FleetProgress:
         workers: Workers | None = None
         with ThreadPoolExecutor(_LOOKING_AT_ONCE) as pool:
             looked = pool.map(_look, self._recordings)
-            fresh = (
-                item
-                for index, (recording, found) in enumerate(
-                    zip(self._recordings, looked, strict=True)
-                )
-                if (item := self._new(index, recording, found)) is not None
-            )
+            fresh = filter(None, map(self._new, self._recordings, looked))
             try:
-                running: dict[int, _Item] = {}
+                running: dict[str, _Item] = {}  # by source
                 while True:
                     while workers is None or workers.has_room():
                         item = self._next(fresh)
@@ -172,9 +164,10 @@ class _Ingest:
                         break
                     if running and workers is not None:
                         for task, outcome in workers.wait(_SECONDS_BETWEEN_LOOKS):
-                            self._ended(running.pop(task.index), outcome)
+                            self._ended(running.pop(task.source), outcome)
                     else:
-                        time.sleep(min(_SECONDS_BETWEEN_LOOKS, self._until_next()))
+                        first = min(item.pause_end for item in self._paused)
+                        time.sleep(min(_SECONDS_BETWEEN_LOOKS, max(0, first - time.monotonic())))
             finally:
                 pool.shutdown(wait=False, cancel_futures=True)
                 if workers is not None:
@@ -184,28 +177,20 @@ class _Ingest:
 
     def _next(self, fresh: Iterator[_Item]) -> _Item | None:
         """Return the next recording: first one whose pause is over."""
-        if self._paused and self._until_next() <= 0:
-            return heapq.heappop(self._paused)[2]
+        for item in self._paused:
+            if item.pause_end <= time.monotonic():
+                self._paused.remove(item)
+                return item
         return next(fresh, None)
 
-    def _until_next(self) -> float:
-        return self._paused[0][0] - time.monotonic()
-
-    def _new(self, index: int, recording: Recording, found: State | MsgflowError) -> _Item | None:
+    def _new(self, recording: Recording, found: State | MsgflowError) -> _Item | None:
         """Return the item of a recording; None if there is nothing to do."""
-        item = _Item(index, recording)
+        item = _Item(recording)
         if isinstance(found, MsgflowError):
             item.tries = 1
             reason = Reason.BROKEN if isinstance(found, TraceError) else Reason.UNREACHABLE
-            self._failed_now(
-                item,
-                Outcome(
-                    reason=reason,
-                    stage="looking at the source",
-                    error=without_secrets(found.message),
-                    hint=found.hint,
-                ),
-            )
+            words = without_secrets(found.message)
+            self._failed_now(item, Outcome(reason, "looking at the source", words, found.hint))
             return None
         item.state = found
         run = self._runs.get(self._sources.get(recording.source, ""))
@@ -248,7 +233,7 @@ class _Ingest:
         self._know(key, row)
         return row
 
-    def _submit(self, workers: Workers, item: _Item, running: dict[int, _Item]) -> None:
+    def _submit(self, workers: Workers, item: _Item, running: dict[str, _Item]) -> None:
         options = self._options
         source = item.recording.source
         assert item.state is not None
@@ -256,7 +241,6 @@ class _Ingest:
             item.state.size, is_archive=item.state.is_archive, is_remote=source.startswith(S3)
         )
         task = Task(
-            item.index,
             source,
             self._lake.store.url,
             **vars(options),
@@ -265,17 +249,10 @@ class _Ingest:
         )
         item.tries += 1
         if (words := workers.is_too_large(task)) is not None:
-            self._failed_now(
-                item,
-                Outcome(
-                    reason=Reason.TOO_LARGE,
-                    stage="giving it to a worker",
-                    error=words,
-                    hint="a machine that has it, or --memory if it needs less",
-                ),
-            )
+            hint = "a machine that has it, or --memory if it needs less"
+            self._failed_now(item, Outcome(Reason.TOO_LARGE, "giving it to a worker", words, hint))
             return
-        running[item.index] = item
+        running[source] = item
         workers.submit(task)
 
     def _ended(self, item: _Item, outcome: Outcome) -> None:
@@ -403,8 +380,8 @@ class _Ingest:
         if outcome.reason in PASSING and item.tries < self._options.tries and item.state:
             pause = min(self._options.pause * 2 ** (item.tries - 1), _LONGEST_PAUSE)
             # At random moments: many may have failed together for one reason.
-            when = time.monotonic() + pause * random.uniform(0.5, 1.5)
-            heapq.heappush(self._paused, (when, item.index, item))
+            item.pause_end = time.monotonic() + pause * random.uniform(0.5, 1.5)
+            self._paused.append(item)
             self._progress.retried += 1
             return
         source = item.recording.source

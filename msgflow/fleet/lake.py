@@ -25,7 +25,8 @@ from msgflow.errors import DatabaseError, UsageError
 from msgflow.files.text_file import MOST_BYTES
 from msgflow.fleet import layout
 from msgflow.fleet.file_store import Store
-from msgflow.fleet.parquet import read_parquet
+from msgflow.fleet.layout import read_parquet
+from msgflow.result.query_result import QueryResult
 from msgflow.sql.failure import first_line
 from msgflow.sql.statement import registered
 from msgflow.version import __version__
@@ -40,6 +41,17 @@ FROM known
 QUALIFY row_number() OVER (PARTITION BY run ORDER BY committed_ns DESC) = 1
 ORDER BY run
 """
+
+# Labels as KEY=VALUE, for people.
+_LABELS = """
+nullif(list_transform(map_entries(labels), lambda each: each.key || '=' || each.value), [])
+"""
+_RUNS = f"""
+SELECT run, name, {_LABELS} AS labels, start_ns, end_ns, event_count, source, msgflow_version,
+    seconds, tries, worker, part
+FROM listed
+"""
+_FAILURES = f"SELECT * REPLACE ({_LABELS} AS labels) FROM listed"
 
 
 class Lake:
@@ -240,6 +252,21 @@ class Lake:
             os.close(descriptor)
 
 
+def list_runs(lake: Lake) -> QueryResult:
+    """Return the runs of a lake: the table `run`, with labels as KEY=VALUE."""
+    return _listed(lake.runs(), _RUNS)
+
+
+def list_failures(lake: Lake) -> QueryResult:
+    """Return the failed recordings: the table `fleet_failure`, with labels as KEY=VALUE."""
+    return _listed(lake.failures(), _FAILURES)
+
+
+def _listed(rows: pa.Table, sql: str) -> QueryResult:
+    with open_memory() as con, registered(con, listed=rows):
+        return QueryResult(con.sql(sql).to_arrow_table())
+
+
 def _is_free(store: Store) -> bool:
     """Tell whether there is nothing, or no more than another process that makes a lake there."""
     found = [each.path for each in store.entries(recursive=False)] + store.folders()
@@ -248,18 +275,14 @@ def _is_free(store: Store) -> bool:
 
 def _require_sound(rows: pa.Table, name: str, url: str) -> None:
     """Raise unless rows of the table `run` have what their order and their files depend on."""
-    lacking = [column for column in ("run", "committed_ns") if rows[column].null_count]
-    names = {key: [each for each in rows[key].to_pylist() if each is not None] for key in _NAMES}
-    unfit = [key for key in _NAMES if any("/" in each for each in names[key])]
-    if lacking:
-        what = f"a row without {lacking[0]}"
-    elif unfit:
-        what = f"a {unfit[0]} that is no name"
-    elif name != layout.PACKED and names["run"] != [name]:
-        what = "a file with another name than its run"
-    else:
-        return
-    raise DatabaseError(
-        f"cannot read the runs of the lake: {what} — {url}",
-        "delete this file; the recordings of its runs have to be ingested again",
-    )
+    wrong = [f"a row without {each}" for each in ("run", "committed_ns") if rows[each].null_count]
+    for key in _NAMES:
+        if any("/" in each for each in rows[key].to_pylist() if each is not None):
+            wrong.append(f"a {key} that is no name")
+    if name != layout.PACKED and rows["run"].to_pylist() != [name]:
+        wrong.append("a file with another name than its run")
+    if wrong:
+        raise DatabaseError(
+            f"cannot read the runs of the lake: {wrong[0]} — {url}",
+            "delete this file; the recordings of its runs have to be ingested again",
+        )

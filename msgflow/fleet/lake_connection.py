@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 import shlex
 import tempfile
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -24,9 +25,8 @@ import pyarrow.parquet as pq
 from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.sql_guard import require_condition
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.layout import RUN, VIEWS, part_path, view_path
-from msgflow.fleet.part import KEY, PART, public_views, view_rows, write_rows
+from msgflow.fleet.part import ANSWERS, KEY, PART, public_views, view_rows, write_rows
 from msgflow.fleet.run_database import run_database
 from msgflow.sql.failure import first_line
 from msgflow.sql.quoting import identifier, literal
@@ -73,18 +73,13 @@ def choose(lake: Lake, where: str | None = None) -> Choice:
     return Choice(lake, chosen, labels, len(runs))
 
 
-def label_columns(labels: Sequence[str], columns: Sequence[str]) -> list[str]:
-    """Return the labels that SQL can call by their keys: those that are not names of columns."""
-    taken = {name.lower() for name in columns}
-    lower = [label.lower() for label in labels]
-    return [each for each in labels if each.lower() not in taken and lower.count(each.lower()) == 1]
-
-
 def _fitting(
     con: duckdb.DuckDBPyConnection, runs: pa.Table, labels: Sequence[str], where: str
 ) -> pa.Table:
     con.register("known_run", runs)
-    named = label_columns(labels, runs.column_names)
+    # SQL can call those labels by their keys that are not names of columns.
+    names = Counter(name.lower() for name in (*labels, *runs.column_names))
+    named = [label for label in labels if names[label.lower()] == 1]
     columns = [f"labels[$label_{n}] AS {identifier(key)}" for n, key in enumerate(named)]
     # A comment at the end of the condition ends with the line.
     table = f"SELECT {', '.join(['*', *columns])} FROM known_run"

@@ -11,9 +11,9 @@ import pyarrow.compute as pc
 
 from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
+from msgflow.fleet.lake import list_failures
 from msgflow.fleet.lake_connection import Reading, choose, lake_errors
-from msgflow.fleet.lake_query import fleet_query, header_of, statements
-from msgflow.fleet.listing import list_failures
+from msgflow.fleet.lake_query import STATEMENTS, fleet_query, header_of
 from msgflow.result.query_result import QueryResult
 from msgflow.text.shell import shell_quoted
 from msgflow.view.assets import single_page
@@ -48,11 +48,11 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
     option += f" --where {shell_quoted(where)}" if where else ""
     with Reading(choice, ["flow"]) as reading, lake_errors(lake, is_query=True):
         tables = {
-            name: statements().run(reading.connection, name, {"count": 10}).to_arrow_table()
+            name: STATEMENTS.run(reading.connection, name, {"count": 10}).to_arrow_table()
             for name in _STATEMENTS
         }
     for name, table in tables.items():
-        parts[f"{name}?"] = _encoded(QueryResult(table, statements().header(name)))
+        parts[f"{name}?"] = _encoded(QueryResult(table, STATEMENTS.header(name)))
     result = fleet_query(lake, _LATENCY, where=where)
     command = f"msgflow fleet query {_LATENCY} {option}"
     parts["page_path?"] = _encoded(result, command=command)
@@ -72,7 +72,11 @@ def lake_page(lake: Lake, *, where: str | None = None) -> LakePage:
     failures = list_failures(lake).table
     failed = f"msgflow fleet failures --lake {shell_quoted(lake.store.url)}"
     parts["page_failure?"] = encode(_with_time(failures), meta={"command": failed})
-    parts["run"] = encode(_frame(lake, tables["page_run"]))
+    name = lake.store.url.rstrip("/").rpartition("/")[2] or lake.store.url
+    # The row that the head of a page shows; here it names the lake.
+    parts["run"] = encode(
+        pa.table({"run_id": [0], "name": [name], "start_text": ["0"], "runs": [len(choice.runs)]})
+    )
     head: dict[str, Any] = {
         "notes": notes,
         "pages": ["lake"],
@@ -109,9 +113,3 @@ def _with_time(failures: pa.Table) -> pa.Table:
     texts = pc.strftime(pc.cast(moments, pa.timestamp("s"), safe=False), "%Y-%m-%d %H:%M:%S")
     names = ["source", "reason", "error", "hint", "labels", "stage", "tries", "worker"]
     return failures.select(names).add_column(1, "failed", texts)
-
-
-def _frame(lake: Lake, runs: pa.Table) -> pa.Table:
-    """Return the row that the head of a page shows; here it names the lake."""
-    name = lake.store.url.rstrip("/").rpartition("/")[2] or lake.store.url
-    return pa.table({"run_id": [0], "name": [name], "start_text": ["0"], "runs": [len(runs)]})

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -20,9 +20,9 @@ import pyarrow as pa
 
 from msgflow.database import guarded_rows, sql_error
 from msgflow.errors import DatabaseError, QueryError, UsageError
-from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.lake_connection import Reading, choose, lake_errors, what_there_is
 from msgflow.fleet.layout import VIEWS
+from msgflow.fleet.part import ANSWERS
 from msgflow.query.catalogue import choose_query, load_query, queries_meant
 from msgflow.query.runner import bind, shown_rows
 from msgflow.query.selection import make_selection, selected, values_of
@@ -50,12 +50,7 @@ _LISTS = re.compile(
 # DuckDB says this of a statement when files have other columns.
 _LACKING = re.compile(r'does not have a column named "(\w+)"')
 _BUCKETS = "distributed"
-
-
-@cache
-def statements() -> Statements:
-    """Return the statements below `sql`."""
-    return Statements(Path(__file__).parent / "sql")
+STATEMENTS = Statements(Path(__file__).parent / "sql")
 
 
 @cache
@@ -63,8 +58,8 @@ def names() -> tuple[str, ...]:
     """Return the names of the queries that a lake answers, sorted."""
     return tuple(
         name.replace("_", "-")
-        for name in statements().names()
-        if any(column.name == GROUP for column in statements().header(name).columns)
+        for name in STATEMENTS.names()
+        if any(column.name == GROUP for column in STATEMENTS.header(name).columns)
     )
 
 
@@ -89,7 +84,7 @@ def header_of(name: str, given: Mapping[str, Value] | None = None) -> Header:
             f"it answers {', '.join(_words())}; for others: msgflow fleet open RUN, then"
             f" {query.command}",
         )
-    header = statements().header(query.name.replace("-", "_"))
+    header = STATEMENTS.header(query.name.replace("-", "_"))
     return replace(
         header, chosen=query.words, params=(*variants, *header.params), variants=variants
     )
@@ -122,11 +117,7 @@ def fleet_query(
         _require_tables(reading, header)
         grouped = _group(con, choice, header, group_by)
         sql, bindings = selected(grouped, chosen, internal)
-
-        def ask() -> Any:
-            return con.sql(sql, params=own | bindings).to_arrow_table()
-
-        table = _asked(lake, name, con, ask)
+        table = _asked(lake, name, con, lambda: con.sql(sql, params=own | bindings))
     table, missing, _ = shown_rows(table, internal=internal)
     notes = []
     if len(choice.runs) < choice.total:
@@ -158,10 +149,8 @@ def fleet_sql(
                 return guarded_rows(con, text, "msgflow fleet sql 'FROM run'", limit)
     except duckdb.Error as error:
         said = sql_error(error, "ask about fewer runs with --where")
-        parts = choice.runs.select(["view_part", "database_part"]).to_pylist()
-        if isinstance(error, duckdb.CatalogException) and not any(
-            part for row in parts for part in row.values()
-        ):
+        parts = [*choice.runs["view_part"].to_pylist(), *choice.runs["database_part"].to_pylist()]
+        if isinstance(error, duckdb.CatalogException) and not any(parts):
             said.hint = "these runs have no views: --no-database left them out, and not --views"
         raise said from error
 
@@ -170,15 +159,13 @@ def fleet_worst(
     lake: Lake, path: str, *, where: str | None = None, limit: int = DEFAULT_LIMIT
 ) -> QueryResult:
     """Return the slowest flows of a path, each with the command that opens it."""
-    header = statements().header(WORST)
+    header = STATEMENTS.header(WORST)
     choice = choose(lake, where)
     with Reading(choice, _tables(header)) as reading:
         con = reading.connection
         _require_tables(reading, header)
         values = {"path": path, "count": limit}
-        table = _asked(
-            lake, WORST, con, lambda: statements().run(con, WORST, values).to_arrow_table()
-        )
+        table = _asked(lake, WORST, con, lambda: STATEMENTS.run(con, WORST, values))
     if not len(table):
         raise UsageError(
             f"no flow of these runs reached the end of a path with this text — {path}",
@@ -209,7 +196,7 @@ def _command(lake: Lake, row: Mapping[str, Any]) -> str | None:
 
 
 def _tables(header: Header) -> list[str]:
-    read = relations_of(statements().text(header.name))
+    read = relations_of(STATEMENTS.text(header.name))
     return sorted(read.intersection(ANSWERS))
 
 
@@ -257,31 +244,32 @@ def _group(
     number = f"dense_rank() OVER (ORDER BY {', '.join(values)})" if values else "1::BIGINT"
     rows = con.sql(f"SELECT run, {number} AS {GROUP} FROM run", params=bound)
     con.register("run_group", rows.to_arrow_table())
+    kept = tuple(column for column in header.columns if column.name != GROUP)
+    text = STATEMENTS.text(header.name).rstrip().rstrip(";")
     if not columns:
-        kept = tuple(column for column in header.columns if column.name != GROUP)
-        body = f"SELECT * EXCLUDE ({GROUP}) FROM (\n{_text(header)}\n)"
+        body = f"SELECT * EXCLUDE ({GROUP}) FROM (\n{text}\n)"
         return replace(header, columns=kept, body=body)
     labels = con.sql(f"SELECT DISTINCT {number} AS {GROUP}{listed} FROM run", params=bound)
     con.register("group_label", labels.to_arrow_table())
     body = (
         "SELECT l.* EXCLUDE (label_group), q.* EXCLUDE (label_group, place) FROM ("
-        f"SELECT row_number() OVER () AS place, * FROM (\n{_text(header)}\n)) AS q "
+        f"SELECT row_number() OVER () AS place, * FROM (\n{text}\n)) AS q "
         f"JOIN group_label AS l ON q.{GROUP} = l.{GROUP} ORDER BY q.place"
     )
-    kept = tuple(column for column in header.columns if column.name != GROUP)
     first = tuple(column.name for column in columns)
     brief = (*header.brief[:1], *first, *header.brief[1:])
     return replace(header, columns=(*columns, *kept), body=body, brief=brief)
 
 
-def _text(header: Header) -> str:
-    return statements().text(header.name).rstrip().rstrip(";")
-
-
-def _asked(lake: Lake, name: str, con: duckdb.DuckDBPyConnection, ask: Any) -> Any:
+def _asked(
+    lake: Lake,
+    name: str,
+    con: duckdb.DuckDBPyConnection,
+    ask: Callable[[], duckdb.DuckDBPyRelation],
+) -> pa.Table:
     try:
         with lake_errors(lake, is_query=True):
-            return interruptible(con, ask, only_reads=True)
+            return interruptible(con, lambda: ask().to_arrow_table(), only_reads=True)
     except duckdb.Error as error:
         lacking = _LACKING.search(str(error))
         if lacking is not None and name in names():

@@ -1,4 +1,4 @@
-"""The layout of a lake: paths of its files, and columns of its tables of runs and failures.
+"""The layout of a lake: paths of its files, columns of its tables of runs and failures, and rows.
 
 Paths and names are an interface: users read them with DuckDB, Spark and others, see docs/fleet.md.
 """
@@ -11,6 +11,7 @@ import re
 import secrets
 
 import pyarrow as pa
+import pyarrow.parquet
 
 from msgflow.errors import DatabaseError
 from msgflow.version import __version__
@@ -22,6 +23,7 @@ PACKED = "packed"
 FAILURE = "fleet_failure"
 VIEWS = "view"
 DATABASE = "database"
+_LARGE = 1_000_000
 _FORMAT = "msgflow lake"
 _PACK = re.compile(r"pack-[0-9a-f]{10}-(\d{1,9})")
 # A name without a part is one of a killed writer: it has a dot before it and .part behind.
@@ -116,8 +118,26 @@ def metadata(table: str, schema_revision: str) -> dict[str, str]:
     }
 
 
+def read_parquet(content: bytes, schema: pa.Schema | None = None) -> pa.Table:
+    """Return the rows of a Parquet file, without pandas and without columns from folder names."""
+    # `read_table` would import pandas if that is installed.
+    file = pyarrow.parquet.ParquetFile(pa.BufferReader(content))
+    # Most files have one row: threads would cost more than they save.
+    table = file.read(use_threads=len(content) > _LARGE).replace_schema_metadata()
+    if schema is None:
+        return table
+    if table.schema.equals(schema):
+        return pa.Table.from_arrays(table.columns, schema=schema)
+    columns = [
+        table[field.name].cast(field.type)
+        if field.name in table.column_names
+        else pa.nulls(len(table), field.type)
+        for field in schema
+    ]
+    return pa.table(columns, schema=schema)
+
+
 def _schema(*columns: tuple[str, pa.DataType, str]) -> pa.Schema:
-    """Return columns, each with its meaning."""
     return pa.schema(
         [pa.field(name, kind, metadata={"description": text}) for name, kind, text in columns]
     )

@@ -18,8 +18,8 @@ import pyarrow.compute as pc
 
 from msgflow.errors import DatabaseError
 from msgflow.fleet import layout
-from msgflow.fleet.answers import ANSWERS
-from msgflow.fleet.parquet import read_parquet
+from msgflow.fleet.layout import read_parquet
+from msgflow.fleet.part import ANSWERS
 from msgflow.sql.failure import first_line
 from msgflow.version import __version__
 

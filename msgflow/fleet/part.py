@@ -17,8 +17,10 @@ import pyarrow.parquet
 from msgflow.db.connection import recorded_revision
 from msgflow.db.objects import public_names
 from msgflow.errors import TraceError
-from msgflow.fleet.answers import ANSWERS, answer
 from msgflow.fleet.layout import RUN, database_path, metadata, new_part, part_path, view_path
+from msgflow.query.catalogue import load_query
+from msgflow.query.runner import run_query
+from msgflow.run.slice import Slice
 from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
 
@@ -32,6 +34,14 @@ _ROWS_AT_ONCE = 100_000
 _RUN_ID = "run_id"
 # Public views that a lake does not hold: its own table `run` has the useful columns.
 _LEFT_OUT = (RUN,)
+# Those of statements of the program; buckets of a distribution can be added up.
+_OWN = ("flow", "distribution")
+_FINDING = "finding"
+ANSWERS = (
+    *_OWN, _FINDING, "e2e_latency", "callbacks", "waits", "executor_usage", "topics_latency",
+    "topics_delivery", "topics_rate", "timers", "service_latency", "action_latency", "info_quality",
+)  # fmt: skip
+"""The tables, as they are computed; others have the rows of the named query of that name."""
 
 
 def run_key(connection: duckdb.DuckDBPyConnection, run_id: int) -> str:
@@ -64,7 +74,7 @@ def write_part(
     first = {KEY: key, PART: part}
     table, compressed = scratch / "table.parquet", scratch / "compressed"
     for each in ANSWERS:
-        rows = answer(connection, run_id, each).to_reader(_ROWS_AT_ONCE)
+        rows = _answer(connection, run_id, each).to_reader(_ROWS_AT_ONCE)
         write_rows(table, each, rows, first, revision)
         store.put(part_path(each, part), table)
     if views:
@@ -75,8 +85,6 @@ def write_part(
         with file.open("rb") as source, pa.CompressedOutputStream(str(compressed), "zstd") as sink:
             shutil.copyfileobj(source, sink, 1 << 20)
         store.put(database_path(part), compressed)
-    for written in (table, compressed):
-        written.unlink(missing_ok=True)
     return {
         KEY: key,
         PART: part,
@@ -89,6 +97,17 @@ def write_part(
         "msgflow_version": __version__,
         "schema_revision": revision,
     }
+
+
+def _answer(con: duckdb.DuckDBPyConnection, run_id: int, table: str) -> pa.Table:
+    """Return the rows of a run, with `run_id`, in a fixed order."""
+    if table in _OWN:
+        return internal_sql().run(con, f"fleet_{table}", {"runs": [run_id]}).to_arrow_table()
+    if table == _FINDING:
+        statement = "FROM main.finding WHERE run_id = $run_id ORDER BY ALL"
+        return con.sql(statement, params={"run_id": run_id}).to_arrow_table()
+    query = load_query(table.replace("_", "-"))
+    return run_query(con, query, {}, Slice(run_id), internal=True).to_arrow()
 
 
 def public_views(connection: duckdb.DuckDBPyConnection) -> list[str]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 import shlex
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
@@ -59,25 +59,23 @@ def open_run(lake: Lake, run: str, path: Path | None = None) -> OpenedRun:
             f" — {row['run']}",
             f"msgflow ingest {shlex.quote(row['source'] or '')}",
         )
-    aside = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
     try:
-        _fetch(lake, row, aside)
-        before = _upgraded(lake, row, aside)
-        _opened(lake, row, aside).close()
-        try:
-            # This fails if the file exists by now.
-            os.link(aside, target)
-        except FileExistsError:
-            raise UsageError(
-                f"the file exists already — {target}", "give another one with -o"
-            ) from None
-        except OSError:  # a file system without links
-            aside.replace(target)
+        with TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as folder:
+            aside = Path(folder) / target.name
+            _fetch(lake, row, aside)
+            before = _upgraded(lake, row, aside)
+            _opened(lake, row, aside).close()
+            try:
+                # This fails if the file exists by now.
+                os.link(aside, target)
+            except FileExistsError:
+                raise UsageError(
+                    f"the file exists already — {target}", "give another one with -o"
+                ) from None
+            except OSError:  # a file system without links
+                aside.replace(target)
     except OSError as error:
         raise UsageError(f"cannot write the file: {error.strerror} — {target}") from error
-    finally:
-        for left in (aside, aside.with_name(f"{aside.name}.zst"), Path(f"{aside}.wal")):
-            left.unlink(missing_ok=True)
     return OpenedRun(row["run"], row["name"], target, target.stat().st_size, before)
 
 

@@ -1,16 +1,55 @@
-"""Sources that users type: paths, addresses, patterns and manifests, resolved to recordings."""
+"""Sources that users type, resolved to recordings: paths, addresses, patterns and manifests.
+
+A manifest is a list of recordings with their labels, as CSV, JSONL or Parquet. What files a
+recording has tells whether it has changed.
+"""
 
 from __future__ import annotations
 
+import csv
 import fnmatch
 import glob
+import hashlib
+import io
+import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
-from msgflow.errors import UsageError
+import pyarrow as pa
+
+from msgflow.db.runs import require_label
+from msgflow.errors import TraceError, UsageError
+from msgflow.files.text_file import MOST_BYTES
 from msgflow.fleet.file_store import S3, Store, normal_url
-from msgflow.fleet.manifest import is_manifest, read_manifest
-from msgflow.fleet.recording import Recording
+from msgflow.fleet.layout import read_parquet
+from msgflow.trace.archive import SUFFIXES
+
+_MANIFESTS = (".csv", ".jsonl", ".parquet")
+PATH = "path"
+# A recording takes some hundred bytes: this is enough for any fleet.
+_MOST_BYTES = 100 * MOST_BYTES
+# One row: its place, for messages, and its values as text.
+_Row = tuple[str, dict[str, str | None]]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording, which becomes one run."""
+
+    source: str  # absolute path, or `s3://…`: a directory with traces, or an archive
+    labels: Mapping[str, str] = field(default_factory=dict)  # by key
+
+
+@dataclass(frozen=True)
+class State:
+    """The files of a source, without their content."""
+
+    signature: str  # hash of names, sizes and times of all its files
+    size: int  # their bytes
+    is_archive: bool  # by its name
 
 
 def find_recordings(
@@ -40,13 +79,11 @@ def _of(source: str) -> list[Recording]:
         names = _in_bucket(source) if source.startswith(S3) else sorted(glob.glob(source))
         if not names:
             raise UsageError(f"nothing fits the pattern — {source}", "check the path")
-    return [
-        recording
-        for name in names
-        for recording in (
-            read_manifest(name) if is_manifest(name) else [Recording(normal_url(name))]
-        )
-    ]
+    found: list[Recording] = []
+    for name in names:
+        is_manifest = name.lower().endswith(_MANIFESTS)
+        found += read_manifest(name) if is_manifest else [Recording(normal_url(name))]
+    return found
 
 
 def _in_bucket(pattern: str) -> list[str]:
@@ -68,3 +105,198 @@ def _in_bucket(pattern: str) -> list[str]:
 
 def _names(store: Store) -> list[str]:
     return sorted({*store.folders(), *(e.path for e in store.entries(recursive=False))})
+
+
+def read_manifest(source: str) -> list[Recording]:
+    """Return the recordings of a manifest, in its order.
+
+    Each has a path; a relative one starts in the folder of the manifest. All other columns are
+    labels, taken as text; an empty value means no label. Equal rows count once.
+    """
+    url = normal_url(source)
+    folder, _, name = url.rpartition("/")
+    content = Store(folder or "/").read(name, _MOST_BYTES)
+    if content is None:
+        raise UsageError(f"no such manifest — {source}", "check the path")
+    rows = list(_rows(content, source))
+    if not rows:
+        raise UsageError(f"the manifest is empty — {source}", "a column path, and a row for each")
+    found: dict[str, tuple[Recording, str]] = {}
+    for place, values in rows:
+        recording = _recording(place, values, folder, source)
+        earlier, first = found.setdefault(recording.source, (recording, place))
+        if earlier != recording:
+            raise UsageError(
+                f"the manifest says two things of one recording, in {first} and {place}"
+                f" — {values[PATH]}",
+                "leave out one of the two",
+            )
+    return [recording for recording, _ in found.values()]
+
+
+def _recording(place: str, values: Mapping[str, str | None], folder: str, source: str) -> Recording:
+    path = values.get(PATH)
+    if not path:
+        raise UsageError(f"a row without a path, in {place} — {source}", f"fill in {PATH}")
+    labels = {key: value for key, value in values.items() if key != PATH and value}
+    try:
+        for key, value in labels.items():
+            require_label(key, value)
+    except UsageError as error:
+        raise UsageError(f"{error.message}, in {place} — {source}", error.hint) from error
+    is_whole = "://" in path or path.startswith("/")
+    return Recording(normal_url(path if is_whole else f"{folder}/{path}"), labels)
+
+
+def _rows(content: bytes, source: str) -> Iterator[_Row]:
+    if source.lower().endswith(".parquet"):
+        yield from _parquet(content, source)
+        return
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise UsageError(f"the manifest is not UTF-8 — {source}", "save it as UTF-8") from error
+    yield from (_jsonl if source.lower().endswith(".jsonl") else _csv)(text, source)
+
+
+def _csv(text: str, source: str) -> Iterator[_Row]:
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        names = next(reader, [])
+        _require_columns(names, source)
+        for values in reader:
+            place = f"line {reader.line_num}"
+            if not values:
+                continue
+            if len(values) != len(names):
+                raise UsageError(
+                    f"{len(values)} values for {len(names)} columns, in {place} — {source}",
+                    "put values with commas or line breaks between quotes",
+                )
+            yield place, dict(zip(names, values, strict=True))
+    except csv.Error as error:
+        raise UsageError(
+            f"cannot read the manifest: {error}, in line {reader.line_num} — {source}",
+            "a quote inside of quotes is written twice",
+        ) from error
+
+
+def _jsonl(text: str, source: str) -> Iterator[_Row]:
+    for number, line in enumerate(text.split("\n"), 1):
+        if not line.strip():
+            continue
+        try:
+            values = json.loads(line)
+        except (ValueError, RecursionError) as error:
+            raise UsageError(
+                f"cannot read the manifest: {error}, in line {number} — {source}",
+                "one JSON object a line",
+            ) from error
+        if not isinstance(values, dict):
+            raise UsageError(f"no object, in line {number} — {source}", '{"path": "…", …}')
+        _require_columns(list(values), source)
+        yield f"line {number}", {key: _text(value, key) for key, value in values.items()}
+
+
+def _parquet(content: bytes, source: str) -> Iterator[_Row]:
+    try:
+        table = read_parquet(content)
+    except (pa.ArrowException, OSError) as error:
+        raise UsageError(f"cannot read the manifest — {source}", "is it Parquet?") from error
+    _require_columns(table.column_names, source)
+    for number, values in enumerate(table.to_pylist(), 1):
+        yield f"row {number}", {key: _text(value, key) for key, value in values.items()}
+
+
+def _require_columns(names: list[str], source: str) -> None:
+    if PATH not in names:
+        columns = ", ".join(names) or "none"
+        raise UsageError(
+            f"the manifest has no column {PATH}, its columns are {columns} — {source}",
+            "name the recordings in a column path; all others are labels",
+        )
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise UsageError(f"the manifest has two columns {twice[0]} — {source}", "rename one")
+    for name in names:
+        if name != PATH:
+            try:
+                require_label(name, None)
+            except UsageError as error:
+                raise UsageError(f"{error.message}, a column of {source}", error.hint) from error
+
+
+def _text(value: Any, key: str) -> str | None:
+    if isinstance(value, str):
+        try:
+            value.encode()
+        except UnicodeEncodeError as error:
+            raise UsageError(
+                f"a value that is no text: half of a character — {key}", "save it as UTF-8"
+            ) from error
+    if value is None or isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, dict | list | bytes):
+        raise UsageError(f"a label is a text or a number — {key}", "give one value")
+    return str(value)
+
+
+def look_at(source: str) -> State:
+    """Return the state of a source, without reading its files."""
+    store = Store(source)
+    file = store.entry()
+    if file is not None:
+        files = [(source.rpartition("/")[2], file.size, file.changed_ns)]
+    elif store.is_local:
+        files = sorted(_local_files(source))
+    else:
+        # Times in a bucket are those of the upload: a second upload counts as a change.
+        files = [(entry.path, entry.size, entry.changed_ns) for entry in store.entries()]
+    if not files:
+        raise TraceError(f"no such recording — {source}", "check the path")
+    text = "\n".join(f"{name}\t{size}\t{time}" for name, size, time in files)
+    digest = hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()
+    is_archive = file is not None and source.lower().endswith(SUFFIXES)
+    return State(digest[:32], sum(size for _, size, _ in files), is_archive)
+
+
+def fetch(source: str, directory: Path) -> Path:
+    """Copy a source from a bucket into a directory of this machine, under its own name."""
+    store = Store(source)
+    target = directory / source.rpartition("/")[2]
+    if store.entry() is not None:
+        store.fetch("", target)
+        return target
+    for entry in store.entries():
+        place = target / entry.path
+        # Names in a bucket may hold `..`.
+        if not place.resolve().is_relative_to(target.resolve()):
+            raise TraceError(f"a name that leads out of the recording — {entry.path}", None)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        store.fetch(entry.path, place)
+    return target
+
+
+def _local_files(source: str) -> Iterator[tuple[str, int, int]]:
+    seen = {os.path.realpath(source)}
+    for directory, folders, names in os.walk(source, onerror=_raise, followlinks=True):
+        for folder in sorted(folders):
+            # A link may lead to a folder above.
+            place = os.path.realpath(Path(directory, folder))
+            if place in seen:
+                folders.remove(folder)
+            seen.add(place)
+        for name in names:
+            path = Path(directory, name)
+            try:
+                status = path.stat()
+            except FileNotFoundError:  # a dangling link, or deleted meanwhile
+                continue
+            yield str(path.relative_to(source)), status.st_size, status.st_mtime_ns
+
+
+def _raise(error: OSError) -> None:
+    if not isinstance(error, FileNotFoundError | NotADirectoryError):
+        raise error

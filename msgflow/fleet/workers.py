@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from msgflow.errors import UsageError
-from msgflow.fleet.task import Outcome, Reason, Task
-from msgflow.fleet.task_process import run_task
+from msgflow.fleet.task import Outcome, Reason, Task, run_task
 from msgflow.sql.failure import first_line
 
 LOCAL = "local"
@@ -124,7 +123,7 @@ class RayWorkers:
                 yield task, self._ray.get(reference)
             except self._ray.exceptions.RayError as error:
                 words = f"its worker is gone ({type(error).__name__}): {first_line(error)}"
-                yield task, Outcome(reason=Reason.WORKER_LOST, stage="on a worker", error=words)
+                yield task, Outcome(Reason.WORKER_LOST, "on a worker", words)
 
     def close(self) -> None:
         """Cancel all tasks and leave the cluster."""

@@ -23,45 +23,35 @@ def kept_token(place: str) -> str:
     It is kept in a file that its user alone can read. A file that others can read or have written
     is replaced. Where nothing can be kept, each call returns another token.
     """
-    with contextlib.suppress(OSError, RuntimeError):  # the last: there is no home directory
-        path = _file(place)
-        return _read(path) or _keep(path, _new())
-    return _new()
-
-
-def _new() -> str:
-    return secrets.token_urlsafe(_BYTES)
-
-
-def _file(place: str) -> Path:
+    token = secrets.token_urlsafe(_BYTES)
     given = os.environ.get("XDG_STATE_HOME")
-    root = Path(given) if given and os.path.isabs(given) else Path("~/.local/state").expanduser()
-    return root / "msgflow" / f"token-{hashlib.sha256(os.fsencode(place)).hexdigest()}"
+    root = Path(given) if given and os.path.isabs(given) else Path("~/.local/state")
+    name = f"token-{hashlib.sha256(os.fsencode(place)).hexdigest()}"
+    with contextlib.suppress(OSError, RuntimeError):  # the last: there is no home directory
+        path = root.expanduser() / "msgflow" / name
+        return _read(path) or _keep(path, token)
+    return token
 
 
 def _read(path: Path) -> str | None:
-    try:
-        descriptor = os.open(path, _FLAGS)
-    except OSError:
-        return None
-    with open(descriptor, "rb") as file:
-        status = os.fstat(descriptor)
+    with contextlib.suppress(OSError), open(os.open(path, _FLAGS), "rb") as file:
+        status = os.fstat(file.fileno())
         is_ours = (
             stat.S_ISREG(status.st_mode)
             and status.st_uid == os.geteuid()
             and not status.st_mode & _OF_OTHERS
         )
-        found = _TOKEN.fullmatch(file.read(_BYTES * 2)) if is_ours else None
-    return None if found is None else found[0].decode()
+        if is_ours and (found := _TOKEN.fullmatch(file.read(_BYTES * 2))) is not None:
+            return found[0].decode()
+    return None
 
 
 def _keep(path: Path, token: str) -> str:
     path.parent.mkdir(mode=stat.S_IRWXU, parents=True, exist_ok=True)
     aside = path.with_name(f"{path.name}.{secrets.token_hex(_BYTES)}.part")
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
     try:
-        with open(os.open(aside, flags, stat.S_IRUSR | stat.S_IWUSR), "w") as file:
-            file.write(token)
+        aside.touch(stat.S_IRUSR | stat.S_IWUSR, exist_ok=False)
+        aside.write_text(token)
         aside.replace(path)
     finally:
         aside.unlink(missing_ok=True)

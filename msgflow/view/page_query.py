@@ -175,15 +175,9 @@ class Scratch:
 
     def __init__(self) -> None:
         self._connection = duckdb.connect(":memory:")
-        self._connection.execute(
-            "CREATE TABLE flow (run_id BIGINT, path_id BIGINT, root_kind VARCHAR, root_id BIGINT,"
-            " root_at BIGINT, take_id BIGINT, latency BIGINT, status VARCHAR,"
-            " is_loss_affected BOOLEAN)"
-        )
-        self._connection.execute(
-            "CREATE TABLE level (run_id BIGINT, row_key BIGINT, kind UTINYINT, id BIGINT,"
-            " start_at BIGINT, length BIGINT, flags UTINYINT, count BIGINT, busy BIGINT)"
-        )
+        for table, query in {"flow": "path_flow", "level": "segments"}.items():
+            columns = ", ".join(f"{each.name} {each.type}" for each in page_query(query).columns)
+            self._connection.execute(f"CREATE TABLE {table} (run_id BIGINT, {columns})")
         self._locks: dict[tuple[str, int], threading.Lock] = {}
         self._filled: set[tuple[str, int]] = set()
         self._guard = threading.Lock()

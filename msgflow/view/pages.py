@@ -56,13 +56,12 @@ class Pages:
     """Answers to what pages ask, each as bytes (see `table_encoding`).
 
     A pages object may be used by several threads, each with a connection of its own. Pages show the
-    times of `window`; a window with more bars than `most_bars` is sent in bins.
+    times of `window`; a window with more than MOST_BARS bars is sent in bins.
     """
 
-    def __init__(self, window: Window = WHOLE, *, most_bars: int = MOST_BARS) -> None:
+    def __init__(self, window: Window = WHOLE) -> None:
         self._scratch = Scratch()
         self._window = window
-        self._most_bars = most_bars
         self._kept: OrderedDict[str, bytes] = OrderedDict()
         self._guard = threading.Lock()
 
@@ -140,7 +139,7 @@ class Pages:
         (count,) = asked.rows("segment_count")["count"].to_pylist()
         meta: dict[str, Any] = {"start": window.start_ns - asked.origin_ns, "count": count}
         meta["end"] = window.end_ns - asked.origin_ns
-        if count <= self._most_bars:
+        if count <= MOST_BARS:
             table = asked.rows("segments")
         elif bin_ns < level_ns:
             meta["bin"] = bin_ns

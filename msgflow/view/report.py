@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gzip
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,9 +29,9 @@ from msgflow.view.summary import (
     change_section,
     encoded_comparison,
     encoded_section,
+    markdown,
     verdict_section,
 )
-from msgflow.view.summary_markdown import markdown
 from msgflow.view.table_encoding import encode
 
 if TYPE_CHECKING:
@@ -93,12 +94,12 @@ def write_report(
     one = part.one_run(connection, "a report")
     window = part.window([one])
     asked = Question(connection, {"run": one.run_id}, window)
-    maker = _Maker(asked, Pages(window), verification, through, max_size)
+    other = None if compare is None else Slice(compare).one_run(connection, "the other side")
+    if other is not None and other.run_id == one.run_id:
+        raise UsageError("a run is not compared with itself", "give another --compare")
+    maker = _Maker(asked, Pages(window), other, verification, through, max_size)
     try:
-        if path.suffix.lower() == MARKDOWN:
-            content, notes = maker.make_markdown(compare)
-        else:
-            content, notes = maker.make(compare)
+        content = maker.markdown() if path.suffix.lower() == MARKDOWN else maker.pages_in_one()
     finally:
         maker.pages.close()
     written = content.encode()
@@ -109,7 +110,7 @@ def write_report(
         )
     with replacing(path) as temporary:
         temporary.write_bytes(written)
-    return Report(path, len(written), one, tuple(notes))
+    return Report(path, len(written), one, tuple(maker.notes))
 
 
 @dataclass
@@ -118,6 +119,7 @@ class _Maker:
 
     asked: Question
     pages: Pages
+    other: Run | None  # which it is compared with
     verification: Verification | None
     through: str | None
     max_size: int
@@ -128,16 +130,25 @@ class _Maker:
     def answer(self, name: str, /, **params: Any) -> bytes:
         return self.pages.answer(self.asked.connection, name, self.asked.params | params)
 
+    @cached_property
+    def comparison(self) -> Comparison | None:
+        if self.other is None:
+            return None
+        return compare_runs(
+            self.asked.connection, str(self.other.run_id), str(self.asked.run.run_id)
+        )
+
     def keep(self, name: str, /, of: Run | None = None, **params: Any) -> None:
         """Keep an answer, of the other run if one is given."""
         known = "&".join(sorted(f"{key}={value}" for key, value in params.items()))
         place, run = ("", {}) if of is None else (f"@{of.run_id}", {"run": of.run_id})
         self.parts[f"{name}?{known}{place}"] = self.answer(name, **params, **run)
 
-    def make(self, compare: str | int | None) -> tuple[str, list[str]]:
-        shown = self.shown_window()
-        other = None if compare is None else self.other_run(compare)
-        self.keep_runs(other)
+    def pages_in_one(self) -> str:
+        self.look_at_window()
+        runs = [self.asked.run] if self.other is None else [self.other, self.asked.run]
+        rows = (run_page_query(self.asked.connection, "run", {"run": one.run_id}) for one in runs)
+        self.parts["run"] = encode(pa.concat_tables(rows))
         self.keep("finding")
         for name in NAMED:
             self.named[name], content = named(self.asked, name)
@@ -149,26 +160,23 @@ class _Maker:
             self.keep(name)
         self.keep_panels()
         chosen = self.keep_paths()
-        comparison = None
-        if other is not None:
-            comparison = self.compare_with(other)
-            self.keep_comparison(other, comparison, chosen)
-        sections = self.sections(comparison)
+        if self.other is not None and self.comparison is not None:
+            self.keep_comparison(self.other, self.comparison, chosen)
+        sections = self.sections()
         for section in sections:
             content = encoded_section(section, self.asked.origin_ns)
             self.parts[f"summary?part={section.name}"] = content
         names = [section.name for section in sections]
-        said = {"summary": names, "absent": self.empty_pages(other)}
-        head = self.keep_timeline(shown, chosen, said)
-        return single_page(self.parts, head), self.notes
+        said = {"summary": names, "absent": self.empty_pages()}
+        head = self.keep_timeline(chosen, said)
+        return single_page(self.parts, head)
 
-    def make_markdown(self, compare: str | int | None) -> tuple[str, list[str]]:
-        self.shown_window()
+    def markdown(self) -> str:
+        self.look_at_window()
         run = self.asked.run
         if self.through is not None:
             self.paths_through(self.asked.rows("path"))
             self.notes.append(f"Its slowest paths are those with {self.through} (--through).")
-        comparison = None if compare is None else self.compare_with(self.other_run(compare))
         (row,) = run_page_query(self.asked.connection, "run", {"run": run.run_id}).to_pylist()
         facts = [
             format_duration(row["length"]),
@@ -177,46 +185,40 @@ class _Maker:
             f"msgflow {row['msgflow_version']}",
         ]
         findings = read_findings(self.asked.connection, [run.run_id])
-        sections = self.sections(comparison)
-        return markdown(run, facts, self.notes, findings, sections), self.notes
+        return markdown(run, facts, self.notes, findings, self.sections())
 
-    def shown_window(self) -> Window:
-        """Return the times that the report shows; note that they are not the whole run."""
+    def look_at_window(self) -> None:
+        """Raise if nothing is in the window; note that it is not the whole run."""
         origin_ns, length_ns = self.asked.origin_ns, self.asked.length_ns
-        begin = max(origin_ns, self.asked.shown.start_ns)
-        end = min(origin_ns + length_ns + 1, self.asked.shown.end_ns)
-        if length_ns and begin >= end:
+        window = self.asked.window
+        if length_ns and window.start_ns >= window.end_ns:
             raise UsageError(
                 "nothing was recorded in the time window",
                 f"the run lasts {length_ns / 1e9:.3f} s: --start 0s",
             )
         if self.asked.shown != WHOLE:
             self.notes.append(
-                f"Only {(begin - origin_ns) / 1e9:.3f} s to"
-                f" {(end - origin_ns) / 1e9:.3f} s of the run are in this report"
+                f"Only {(window.start_ns - origin_ns) / 1e9:.3f} s to"
+                f" {(window.end_ns - origin_ns) / 1e9:.3f} s of the run are in this report"
                 " (--start, --end)."
             )
-        return Window(begin, end)
 
-    def compare_with(self, other: Run) -> Comparison:
-        return compare_runs(self.asked.connection, str(other.run_id), str(self.asked.run.run_id))
-
-    def sections(self, comparison: Comparison | None) -> list[Section]:
+    def sections(self) -> list[Section]:
         through = self.through or ""
         sections = [self.pages.summary(self.asked, part, through) for part in SUMMARY]
-        if comparison is not None:
-            sections.insert(0, change_section(comparison))
+        if self.comparison is not None:
+            sections.insert(0, change_section(self.comparison))
         if self.verification is not None:
             sections.insert(0, verdict_section(self.verification, self.asked.options))
         return sections
 
-    def empty_pages(self, other: Run | None) -> list[str]:
+    def empty_pages(self) -> list[str]:
         """Return the pages that would show nothing."""
         needed = {"paths": "path", "graph": "row", "timeline": "row"}
         empty = [page for page, name in needed.items() if not self.asked.rows(name).num_rows]
         named = {"nodes": "info-nodes", "topics": "topics-summary"}
         empty += [page for page, name in named.items() if not len(self.named[name])]
-        return [*empty, *([] if other else ["compare"])]
+        return [*empty, *([] if self.other else ["compare"])]
 
     def keep_panels(self) -> None:
         """Keep what callbacks, topics and services did over time: of the first ones of each."""
@@ -227,17 +229,6 @@ class _Maker:
                 given = {} if value is None else {key: value}
                 for name in names:
                     self.keep(name, **given)
-
-    def other_run(self, compare: str | int) -> Run:
-        other = Slice(compare).one_run(self.asked.connection, "the other side")
-        if other.run_id == self.asked.run.run_id:
-            raise UsageError("a run is not compared with itself", "give another --compare")
-        return other
-
-    def keep_runs(self, other: Run | None) -> None:
-        wanted = [*([] if other is None else [other.run_id]), self.asked.run.run_id]
-        rows = (run_page_query(self.asked.connection, "run", {"run": one}) for one in wanted)
-        self.parts["run"] = encode(pa.concat_tables(rows))
 
     def keep_paths(self) -> list[int]:
         """Keep the pictures of paths; return the numbers of those kept."""
@@ -292,11 +283,9 @@ class _Maker:
             if number not in chosen:
                 self.keep("path_share", path=number)
 
-    def keep_timeline(
-        self, window: Window, paths: list[int], said: dict[str, Any]
-    ) -> dict[str, Any]:
+    def keep_timeline(self, paths: list[int], said: dict[str, Any]) -> dict[str, Any]:
         """Keep bars, arrows and links; return the head, which says that beside what is `said`."""
-        origin = self.asked.origin_ns
+        origin, window = self.asked.origin_ns, self.asked.window
         head: dict[str, Any] = said | {
             "start": window.start_ns - origin,
             "end": window.end_ns - origin,

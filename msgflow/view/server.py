@@ -28,7 +28,8 @@ import anyio.to_thread
 import duckdb
 import uvicorn
 from starlette.applications import Starlette
-from starlette.datastructures import Headers
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
@@ -41,22 +42,31 @@ from msgflow.view.shared_database import ReplacedError, SharedDatabase, Unopened
 from msgflow.view.sql_page import Sql, encoded_error, encoded_rows, most_rows
 
 if TYPE_CHECKING:
-    from starlette.requests import Request
     from starlette.types import ASGIApp, Receive, Scope, Send
 
-    Started = Callable[["Interruptible"], None]
+    # It is told, when a question starts, how to end that.
+    Started = Callable[[Callable[[], None]], None]
 
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8642
 # Questions that are answered at the same time; the others wait.
 MOST_AT_ONCE = 4
 _SECONDS_BETWEEN_LOOKS = 0.1
-_LOCAL_NAMES = ("localhost",)
+# SQL has one process, and keeps no page waiting; nor does the next state.
+_ALONE = ("sql", "prepare", "show")
+_NOT_HERE = "this server answers for this machine alone"
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:;"
     " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 _POLICY_OF_FILES = "frame-ancestors 'none'"
+# Status and code of an error, the first kind that it is of.
+_FAILURES = {
+    ReplacedError: (409, "replaced"),
+    UnopenedError: (503, "unopened"),
+    UsageError: (400, "usage"),
+    MsgflowError: (500, "failed"),
+}
 _TYPES = {".js": "text/javascript", ".css": "text/css"}
 _HEADERS = {
     "Content-Security-Policy": _POLICY,
@@ -76,13 +86,6 @@ class Following(Protocol):
 
     def show(self) -> None:
         """Put what was prepared in place of the database."""
-
-
-class Interruptible(Protocol):
-    """Something that runs a question, and can be told to end it."""
-
-    def interrupt(self) -> None:
-        """End the question."""
 
 
 def application(
@@ -114,7 +117,7 @@ def application(
     def rows(params: dict[str, Any], generation: str | None, started: Started) -> bytes:
         limit = most_rows(params)
         shared.require(generation)
-        started(sql)
+        started(sql.interrupt)
         try:
             result = sql(params.get("text", ""), limit)
         except (QueryError, UsageError) as error:
@@ -122,48 +125,36 @@ def application(
         shared.require(generation)
         return encoded_rows(result)
 
-    def prepare() -> bytes:
-        assert following is not None
-        following.prepare()
-        return b""
-
-    def show() -> bytes:
-        assert following is not None
-        following.show()
-        return shared.generation().encode()
+    def answer(
+        name: str, params: dict[str, Any], generation: str | None, started: Started
+    ) -> bytes:
+        if name == "sql":
+            return rows(params, generation, started)
+        if following is not None and name == "prepare":
+            following.prepare()
+            return b""
+        if following is not None and name == "show":
+            following.show()
+            return shared.generation().encode()
+        return shared.answer(name, params, generation, started)
 
     async def data(request: Request) -> Response:
         name = request.path_params["name"]
         params: dict[str, Any] = dict(request.query_params)
         generation = request.headers.get("X-Generation")
-        # SQL has one process, and keeps no page waiting; nor does the next state.
-        alone: dict[str, Callable[[Started], bytes]] = {
-            "sql": lambda started: rows(params, generation, started)
-        }
-        if following is not None:
-            alone |= {"prepare": lambda _: prepare(), "show": lambda _: show()}
-        kind = name if name in alone else ""
+        kind = name if name in _ALONE else ""
         if kind not in limiters:
             limiters[kind] = anyio.CapacityLimiter(1 if kind else MOST_AT_ONCE)
         try:
-            return await _answered(
-                request,
-                limiters[kind],
-                alone.get(name, lambda started: shared.answer(name, params, generation, started)),
-            )
-        except ReplacedError as error:
-            return _failure(error, 409, "replaced")
-        except UnopenedError as error:
-            return _failure(error, 503, "unopened")
-        except UsageError as error:
-            return _failure(error, 400, "usage")
+            ask = partial(answer, name, params, generation)
+            return await _answered(request, limiters[kind], ask)
         except MsgflowError as error:
-            return _failure(error, 500, "failed")
+            return _failure(error)
         except duckdb.Error as error:
-            return _failure(QueryError(first_line(error)), 500, "failed")
+            return _failure(QueryError(first_line(error)))
 
     app = Starlette(routes=[Route("/", page), Route("/{name}", file), Route("/api/{name}", data)])
-    return Guard(app, token)
+    return guarded(app, token)
 
 
 def single_application(make: Callable[[], str], token: str) -> ASGIApp:
@@ -178,14 +169,14 @@ def single_application(make: Callable[[], str], token: str) -> ASGIApp:
         return Response(content, media_type="text/html")
 
     # Its data are in the page, which no cookie opens.
-    return Guard(Starlette(routes=[Route("/", page)]), token, _POLICY_OF_FILES, has_cookie=False)
+    return guarded(Starlette(routes=[Route("/", page)]), token, _POLICY_OF_FILES, has_cookie=False)
 
 
 async def _answered(
     request: Request, limiter: anyio.CapacityLimiter, ask: Callable[[Started], bytes]
 ) -> Response:
     """Return the answer; interrupt the question when the browser no longer waits for it."""
-    asked: list[Interruptible] = []
+    interrupts: list[Callable[[], None]] = []
     content: list[bytes] = []
 
     async def watch() -> None:
@@ -193,16 +184,16 @@ async def _answered(
             await anyio.sleep(_SECONDS_BETWEEN_LOOKS)
         # Repeatedly, since between two statements there is nothing to interrupt.
         while True:
-            for one in asked:
+            for interrupt in interrupts:
                 with suppress(duckdb.Error):  # it has just ended
-                    one.interrupt()
+                    interrupt()
             await anyio.sleep(_SECONDS_BETWEEN_LOOKS)
 
     try:
         async with anyio.create_task_group() as group:
             group.start_soon(watch)
             content.append(
-                await anyio.to_thread.run_sync(lambda: ask(asked.append), limiter=limiter)
+                await anyio.to_thread.run_sync(lambda: ask(interrupts.append), limiter=limiter)
             )
             group.cancel_scope.cancel()
     except BaseExceptionGroup as errors:
@@ -210,16 +201,15 @@ async def _answered(
         raise errors.exceptions[0] from None
     except anyio.get_cancelled_exc_class():
         # The server ends, and does not wait for the question.
-        for one in asked:
-            one.interrupt()
+        for interrupt in interrupts:
+            interrupt()
         return PlainTextResponse("error: the server has ended\n", status_code=503)
     return Response(content[0], media_type="application/octet-stream")
 
 
-def _failure(error: MsgflowError, status: int, code: str) -> Response:
-    return JSONResponse(
-        {"error": error.message, "hint": error.hint, "code": code}, status_code=status
-    )
+def _failure(error: MsgflowError) -> Response:
+    status, code = next(said for kind, said in _FAILURES.items() if isinstance(error, kind))
+    return JSONResponse({"error": error.message, "hint": error.hint, "code": code}, status)
 
 
 def _head() -> str:
@@ -230,69 +220,49 @@ def _head() -> str:
     return f'{sheets}{scripts}<script type="module" src="{assets.ENTRY}"></script>'
 
 
-class Guard:
-    """A guard: it passes on requests with the token, from our own page, to this machine."""
+def guarded(app: ASGIApp, token: str, policy: str = _POLICY, *, has_cookie: bool = True) -> ASGIApp:
+    """Return the application for requests with the token, from our own page, to this machine."""
 
-    def __init__(
-        self, app: ASGIApp, token: str, policy: str = _POLICY, *, has_cookie: bool = True
-    ) -> None:
-        self._app = app
-        self._token = token
-        self._has_cookie = has_cookie
-        self._headers = _HEADERS | {"Content-Security-Policy": policy}
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer, refuse, or pass on."""
-        if scope["type"] != "http":
-            await self._app(scope, receive, send)
-            return
-        from starlette.requests import Request
-
+    async def answer(scope: Scope, receive: Receive, send: Send) -> None:
         request = Request(scope, receive)
-        refusal = self._refusal(request)
-        if refusal is not None:
-            refusal.headers.update(_HEADERS)
-            await refusal(scope, receive, send)
-            return
-
-        headers = dict(self._headers)
-        if self._has_cookie and "token" in request.query_params:
-            cookie = f"{_cookie_name(request)}={cookie_of(self._token)}"
-            headers["Set-Cookie"] = f"{cookie}; HttpOnly; Path=/; SameSite=strict"
+        refused = _refusal(request, token, has_cookie=has_cookie)
+        headers = _HEADERS if refused else _HEADERS | {"Content-Security-Policy": policy}
+        if has_cookie and not refused and "token" in request.query_params:
+            cookie = f"{_cookie_name(request)}={cookie_of(token)}"
+            headers = headers | {"Set-Cookie": f"{cookie}; HttpOnly; Path=/; SameSite=strict"}
 
         async def send_with_headers(message: Any) -> None:
             if message["type"] == "http.response.start":
-                known = [(k.lower().encode(), v.encode()) for k, v in headers.items()]
-                message["headers"] = [*message["headers"], *known]
+                MutableHeaders(scope=message).update(headers)
             await send(message)
 
-        await self._app(scope, receive, send_with_headers)
+        respond = PlainTextResponse(f"error: {refused[1]}\n", refused[0]) if refused else app
+        await respond(scope, receive, send_with_headers)
 
-    def _refusal(self, request: Request) -> Response | None:
-        if not is_local(request.headers.get("host", "")):
-            return PlainTextResponse(
-                "error: this server answers for this machine alone\n", status_code=421
-            )
-        if request.method not in ("GET", "HEAD"):
-            return PlainTextResponse("error: nothing can be changed here\n", status_code=405)
-        if request.headers.get("sec-fetch-site", "none") not in ("none", "same-origin"):
-            # A link on any site may lead to the page; the browser then sends no cookie.
-            is_visit = request.headers.get("sec-fetch-mode") == "navigate"
-            if not (is_visit and request.url.path == "/"):
-                return PlainTextResponse("error: another site asks\n", status_code=403)
-        if request.url.path.startswith("/api/"):
-            is_known = _same(request.headers.get("X-Token", ""), self._token)
-        elif request.url.path == "/" and "token" in request.query_params:
-            is_known = _same(request.query_params["token"], self._token)
-        else:
-            cookie = request.cookies.get(_cookie_name(request), "")
-            is_known = self._has_cookie and _same(cookie, cookie_of(self._token))
-        if is_known:
-            return None
-        return PlainTextResponse(
-            "error: this page needs the address that msgflow ui printed, with its token\n",
-            status_code=403,
-        )
+    return answer
+
+
+def _refusal(request: Request, token: str, *, has_cookie: bool) -> tuple[int, str] | None:
+    """Return the status and the words with which a request is refused."""
+    if not is_local(request.headers.get("host", "")):
+        return 421, _NOT_HERE
+    if request.method not in ("GET", "HEAD"):
+        return 405, "nothing can be changed here"
+    if request.headers.get("sec-fetch-site", "none") not in ("none", "same-origin"):
+        # A link on any site may lead to the page; the browser then sends no cookie.
+        is_visit = request.headers.get("sec-fetch-mode") == "navigate"
+        if not (is_visit and request.url.path == "/"):
+            return 403, "another site asks"
+    if request.url.path.startswith("/api/"):
+        is_known = _same(request.headers.get("X-Token", ""), token)
+    elif request.url.path == "/" and "token" in request.query_params:
+        is_known = _same(request.query_params["token"], token)
+    else:
+        cookie = request.cookies.get(_cookie_name(request), "")
+        is_known = has_cookie and _same(cookie, cookie_of(token))
+    if is_known:
+        return None
+    return 403, "this page needs the address that msgflow ui printed, with its token"
 
 
 def cookie_of(token: str) -> str:
@@ -316,9 +286,7 @@ def is_local(host: str) -> bool:
     name = match[1].lower()
     try:
         _ = urlsplit(f"//{host}").port  # as the application reads it
-        if name in _LOCAL_NAMES:
-            return True
-        return ipaddress.ip_address(name.strip("[]")).is_loopback
+        return name == "localhost" or ipaddress.ip_address(name.strip("[]")).is_loopback
     except ValueError:
         return False
 
@@ -399,7 +367,7 @@ def serve_text(address: str, port: int, make: Callable[[], bytes], media_type: s
     async def answer(scope: Scope, receive: Receive, send: Send) -> None:
         host = Headers(scope=scope).get("host", "")
         response = (
-            PlainTextResponse("error: this server answers for this machine alone\n", 421)
+            PlainTextResponse(f"error: {_NOT_HERE}\n", 421)
             if is_local(address) and not is_local(host)
             else Response(make(), media_type=media_type)
         )

@@ -39,21 +39,20 @@ class Turns:
 
     def ask(self, question: Callable[[], bytes]) -> bytes:
         """Return the answer."""
-        with self._turn(alone=False):
-            answer = _if_memory_suffices(question)
-        if answer is not None:
-            return answer
-        with self._turn(alone=True):
-            answer = _if_memory_suffices(question)
-        if answer is None:
-            raise QueryError(
-                "this takes more memory than the server may use",
-                "start it with more: msgflow ui --memory-limit 8GB",
-            )
-        return answer
+        for alone in (False, True):
+            with self._turn(alone):
+                try:
+                    return question()
+                except (duckdb.OutOfMemoryException, QueryError) as error:
+                    if not isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
+                        raise
+        raise QueryError(
+            "this takes more memory than the server may use",
+            "start it with more: msgflow ui --memory-limit 8GB",
+        )
 
     @contextmanager
-    def _turn(self, *, alone: bool) -> Iterator[None]:
+    def _turn(self, alone: bool) -> Iterator[None]:
         with self._changed:
             self._changed.wait_for(lambda: not self._is_alone and not (alone and self._running))
             self._running += 1
@@ -67,15 +66,6 @@ class Turns:
                 self._changed.notify_all()
 
 
-def _if_memory_suffices(question: Callable[[], bytes]) -> bytes | None:
-    try:
-        return question()
-    except (duckdb.OutOfMemoryException, QueryError) as error:
-        if not isinstance(error.__cause__ or error, duckdb.OutOfMemoryException):
-            raise
-    return None
-
-
 class ReplacedError(DatabaseError):
     """The database is not the one that the page was made of."""
 
@@ -84,52 +74,12 @@ class UnopenedError(DatabaseError):
     """The database cannot be opened, or not yet."""
 
 
-class Ahead:
-    """Asks for the timeline of the latest run before the page does.
-
-    The bars of a large run are counted once, which takes longer than a browser needs to open.
-    """
-
-    def __init__(self, turns: Turns, pages: Pages, cursor: duckdb.DuckDBPyConnection) -> None:
-        self._turns = turns
-        self._pages = pages
-        self._cursor = cursor
-        self._thread = threading.Thread(target=self._ask, daemon=True)
-        self._thread.start()
-
-    def _ask(self) -> None:
-        # The page asks for it too, and shows the error.
-        with suppress(MsgflowError, duckdb.Error):
-            self._turns.ask(lambda: self._pages.answer(self._cursor, "segments", {}))
-
-    def is_asking(self) -> bool:
-        """Tell whether it has no answer yet."""
-        return self._thread.is_alive()
-
-    def stop(self) -> None:
-        """End it, if it still asks."""
-        while self._thread.is_alive():
-            self._cursor.interrupt()
-            self._thread.join(_SECONDS_BETWEEN_LOOKS)
-        self._cursor.close()
-
-
 @dataclass
 class Answers:
     """Answers from one state of the database, which are kept while it is closed."""
 
     generation: str  # of that state, see `generation_of`
     pages: Pages  # answer questions
-    turns: Turns  # of questions
-
-
-@dataclass
-class Opened:
-    """The database as it was opened once."""
-
-    answers: Answers  # from its state
-    base: duckdb.DuckDBPyConnection  # a connection, which those of questions are made of
-    ahead: Ahead  # the question that comes before those of pages
 
 
 class SharedDatabase:
@@ -139,62 +89,76 @@ class SharedDatabase:
         self.path = path
         self._memory_limit = memory_limit
         self._changed = threading.Condition()
+        self._turns = Turns()
         self._cursors: set[duckdb.DuckDBPyConnection] = set()
         self._answers: Answers | None = None
-        self._opened: Opened | None = None
-        self._asked_at = time.monotonic()
-        self._is_closed = False
+        # A connection, which those of questions are made of; None while it is closed.
+        self._base: duckdb.DuckDBPyConnection | None = None
+        # Closes it when no question was asked for a while.
+        self._idle = threading.Timer(SECONDS_UNTIL_FREE, self._free_if_idle)
         self._open()
-        self._idle = threading.Thread(target=self._free_when_idle, daemon=True)
-        self._idle.start()
 
     def generation(self) -> str:
         """Return the generation of the database as it is now, which is opened for it."""
         with self._changed:
-            return self._current().answers.generation
+            return self._current()[0].generation
 
     def require(self, generation: str | None) -> None:
         """Raise unless the database is still that of a page."""
         if generation is not None and not self._is(generation):
-            raise self._replaced()
+            raise ReplacedError(
+                f"the database was changed while the page was open — {self.path}",
+                "reload the page to see it as it is now",
+            )
 
     def answer(
         self,
         name: str,
         params: dict[str, Any],
         generation: str | None,
-        started: Callable[[duckdb.DuckDBPyConnection], None],
+        started: Callable[[Callable[[], None]], None],
     ) -> bytes:
-        """Return the answer to a question of a page."""
+        """Return the answer to a question of a page; `started` is told how to end that."""
         with self._changed:
-            opened = self._current()
-            answers = opened.answers
-            if generation is not None and generation != answers.generation:
-                raise self._replaced()
-            cursor = opened.base.cursor()
-            self._cursors.add(cursor)
+            answers, base = self._current()
+            self.require(generation)
+            cursor = self._new_cursor(base)
+        started(cursor.interrupt)
+        return self._answer(answers, cursor, name, params)
+
+    def _new_cursor(self, base: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnection:
+        cursor = base.cursor()
+        self._cursors.add(cursor)
+        return cursor
+
+    def _answer(
+        self,
+        answers: Answers,
+        cursor: duckdb.DuckDBPyConnection,
+        name: str,
+        params: dict[str, Any],
+    ) -> bytes:
         try:
-            started(cursor)
-            content = answers.turns.ask(lambda: answers.pages.answer(cursor, name, params))
+            content = self._turns.ask(lambda: answers.pages.answer(cursor, name, params))
         except (MsgflowError, duckdb.Error):
-            if not self._is(answers.generation):  # then it was interrupted, or read another file
-                raise self._replaced() from None
+            self.require(answers.generation)  # else it was interrupted, or read another file
             raise
         finally:
             with self._changed:
                 cursor.close()
                 self._cursors.discard(cursor)
-                self._asked_at = time.monotonic()
                 self._changed.notify_all()
-        if not self._is(answers.generation):  # written in its place, it can be a part of each
-            raise self._replaced()
+                self._idle.cancel()
+                self._idle = threading.Timer(SECONDS_UNTIL_FREE, self._free_if_idle)
+                self._idle.daemon = True
+                self._idle.start()
+        self.require(answers.generation)  # written in its place, it can be a part of each
         return content
 
-    def _current(self) -> Opened:
+    def _current(self) -> tuple[Answers, duckdb.DuckDBPyConnection]:
         # A process has a file of one name open once: the old one is closed before the new one.
-        self._asked_at = time.monotonic()
-        end = self._asked_at + _MOST_SECONDS_TO_END
-        while self._opened is None or not self._is(self._opened.answers.generation):
+        end = time.monotonic() + _MOST_SECONDS_TO_END
+        while self._answers is None or self._base is None or not self._is(self._answers.generation):
             if self._cursors:
                 if time.monotonic() > end:
                     raise UnopenedError(
@@ -216,42 +180,38 @@ class SharedDatabase:
                         f"the database is no longer there — {self.path}", "msgflow ui --db FILE"
                     ) from None
                 raise UnopenedError(error.message, error.hint) from None
-        return self._opened
+        return self._answers, self._base
 
     def _open(self) -> None:
         # First: if the file is changed meanwhile, the next request sees another generation.
         generation = generation_of(self.path)
-        base = connect(
+        self._base = connect(
             self.path, read_only=True, memory_limit=self._memory_limit or default_limit()
         )
         if self._answers is None or self._answers.generation != generation:
             self._forget()
-            self._answers = Answers(generation, Pages(), Turns())
-        ahead = Ahead(self._answers.turns, self._answers.pages, base.cursor())
-        self._opened = Opened(self._answers, base, ahead)
-        with self._changed:
-            self._changed.notify_all()
+            self._answers = Answers(generation, Pages())
+        ahead = [self._answers, self._new_cursor(self._base)]
+        threading.Thread(target=self._ask_ahead, args=ahead, daemon=True).start()
 
-    def _free_when_idle(self) -> None:
-        with self._changed:
-            while not self._is_closed:
-                self._changed.wait(self._seconds_until_free())
-                if self._seconds_until_free() == 0:
-                    self._free()
+    def _ask_ahead(self, answers: Answers, cursor: duckdb.DuckDBPyConnection) -> None:
+        """Ask for the timeline of the latest run before the page does.
 
-    def _seconds_until_free(self) -> float | None:
-        """Return in how many seconds to look again, 0 to close it, None to wait for a change."""
-        if self._opened is None or self._cursors:
-            return None
-        if self._opened.ahead.is_asking():
-            return SECONDS_UNTIL_FREE
-        return max(self._asked_at + SECONDS_UNTIL_FREE - time.monotonic(), 0)
+        The bars of a large run are counted once, which takes longer than a browser needs to open.
+        """
+        # The page asks for it too, and shows the error.
+        with suppress(MsgflowError, duckdb.Error):
+            self._answer(answers, cursor, "segments", {})
+
+    def _free_if_idle(self) -> None:
+        with self._changed:
+            if not self._cursors:
+                self._free()
 
     def _free(self) -> None:
-        if self._opened is not None:
-            self._opened.ahead.stop()
-            self._opened.base.close()
-            self._opened = None
+        if self._base is not None:
+            self._base.close()
+            self._base = None
 
     def _forget(self) -> None:
         if self._answers is not None:
@@ -269,25 +229,17 @@ class SharedDatabase:
             cursor.interrupt()
         self._changed.wait(_SECONDS_BETWEEN_LOOKS)
 
-    def _replaced(self) -> ReplacedError:
-        return ReplacedError(
-            f"the database was changed while the page was open — {self.path}",
-            "reload the page to see it as it is now",
-        )
-
     def close(self) -> None:
         """Close the database."""
         end = time.monotonic() + _MOST_SECONDS_TO_END
         with self._changed:
             while self._cursors and time.monotonic() < end:
                 self._end_questions()
-            self._is_closed = True
-            self._changed.notify_all()
+            self._idle.cancel()
             # Now and then an interrupt leaves a query of DuckDB that only the process ends.
             if not self._cursors:
                 self._free()
             self._forget()
-        self._idle.join()
 
 
 def generation_of(path: Path) -> str:

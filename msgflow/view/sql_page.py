@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Protocol
 
 import pyarrow as pa
@@ -129,17 +130,10 @@ def _sendable(column: pa.ChunkedArray) -> pa.Array:
     if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind):
         return array
     if pa.types.is_decimal(kind):
-        return _of_decimals(array)
+        # Sums have no fraction, and stay exact: as text, if they are too large for a number.
+        with suppress(pa.ArrowInvalid):
+            return compute.cast(array, pa.float64() if kind.scale else pa.int64())
+        return compute.cast(array, pa.string())
     if pa.types.is_string(kind) or pa.types.is_large_string(kind) or pa.types.is_dictionary(kind):
         return compute.cast(array, pa.string())
     return pa.array(map(json_text, array.to_pylist()), pa.string())
-
-
-def _of_decimals(array: pa.Array) -> pa.Array:
-    """Return decimals as numbers; sums have no fraction, and stay exact."""
-    if array.type.scale:
-        return compute.cast(array, pa.float64())
-    try:
-        return compute.cast(array, pa.int64())
-    except pa.ArrowInvalid:
-        return compute.cast(array, pa.string())

@@ -1,14 +1,15 @@
 """The summary of a run: what somebody reads who opens only that.
 
-Each section is the answer of a command, cut to its first rows, so that the page, the Markdown and
-the command line have the same numbers.
+Each section is the answer of a command, cut to its first rows, so that the page, the Markdown for a
+pull request or an issue, and the command line have the same numbers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from itertools import groupby
+from typing import TYPE_CHECKING, NamedTuple
 
 import pyarrow as pa
 
@@ -19,12 +20,17 @@ from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection
 from msgflow.query.why import explain
 from msgflow.result.query_result import QueryResult
+from msgflow.result.rows import cells
 from msgflow.sql.quoting import literal
+from msgflow.text.markdown import code, code_lines, markdown_line, rule_line
 from msgflow.text.shell import shell_joined
+from msgflow.text.values import format_cell
 from msgflow.view.table_encoding import encode_result
 
 if TYPE_CHECKING:
+    from msgflow.db.finding import Finding
     from msgflow.query.compare import Comparison
+    from msgflow.run.choice import Run
     from msgflow.sql.value import Value
     from msgflow.verify.verify import Verification
     from msgflow.view.page_query import Question
@@ -32,6 +38,8 @@ if TYPE_CHECKING:
 # The slowest paths whose latency is taken apart.
 MOST_PATHS = 3
 _MOST_ROWS = 5
+# Places of each kind of finding in Markdown; `msgflow check` lists all of them.
+_MOST_PLACES = 3
 _QUERIES = {
     "paths": ("e2e-latency", Selection(where="pairs > 0", sort=("max_ns:desc",), limit=MOST_PATHS)),
     "drops": (
@@ -48,69 +56,55 @@ _AREA = {
     "callbacks": ("callbacks", "total_ns:desc"),
     "usage": ("executor-usage", "callback_ns:desc"),
 }
-_TITLES = {
-    "why": "What makes data late, or lets them get lost",
-    "callbacks": "Callbacks that began in it",
-    "usage": "What threads did in it",
-    "paths": "Slowest paths",
-    "blame": "Where the time of the slowest flows went",
-    "drops": "What was dropped or lost, and why",
-    "threads": "Busiest threads",
-    "verdicts": "Requirements",
-    "change": "What changed",
-}
-_COLUMNS = {
-    "why": ("sentence",),
-    "callbacks": ("node", "callback", "count", "total_ns", "median_ns", "max_ns"),
-    "usage": ("nodes", "tid", "callback_share", "callback_ns", "take_ns", "select_ns", "wait_ns",
-              "blocked_ns", "unknown_ns"),
-    "paths": ("path", "median_ns", "p99_ns", "max_ns", "reached", "roots"),
-    "blame": ("path", "latency_ns", "node", "duration_ns", "share"),
-    "drops": ("topic_name", "subscriber", "published", "delivered", "dropped", "lost", "reasons"),
-    "threads": ("nodes", "tid", "callback_share", "callback_ns", "callbacks"),
-    "verdicts": ("verdict", "target", "subject", "metric", "condition", "measured", "reason",
-                 "worst_ns"),
-    "change": ("path", "change", "a_median_ns", "b_median_ns", "median_percent", "p95_percent",
-               "max_percent"),
+_NO_FLOW = "No flow reached the end of a path."
+
+
+class Kind(NamedTuple):
+    """What sections of one name are about."""
+
+    title: str
+    when_empty: str  # what to say where there are no rows
+    columns: tuple[str, ...]  # those that matter most
+
+
+_KINDS = {
+    "why": Kind("What makes data late, or lets them get lost", _NO_FLOW, ("sentence",)),
+    "paths": Kind("Slowest paths", _NO_FLOW,
+        ("path", "median_ns", "p99_ns", "max_ns", "reached", "roots")),
+    "blame": Kind("Where the time of the slowest flows went", _NO_FLOW,
+        ("path", "latency_ns", "node", "duration_ns", "share")),
+    "drops": Kind("What was dropped or lost, and why",
+        "Nothing was dropped or lost, as far as the trace tells.",
+        ("topic_name", "subscriber", "published", "delivered", "dropped", "lost", "reasons")),
+    "threads": Kind("Busiest threads", "No thread of an executor ran a callback.",
+        ("nodes", "tid", "callback_share", "callback_ns", "callbacks")),
+    "verdicts": Kind("Requirements", "The file has no requirements.",
+        ("verdict", "target", "subject", "metric", "condition", "measured", "reason", "worst_ns")),
+    "change": Kind("What changed", "No path differs.",
+        ("path", "change", "a_median_ns", "b_median_ns", "median_percent", "p95_percent",
+         "max_percent")),
+    # Of a part of the timeline.
+    "callbacks": Kind("Callbacks that began in it", "No callback of these nodes began in it.",
+        ("node", "callback", "count", "total_ns", "median_ns", "max_ns")),
+    "usage": Kind("What threads did in it", "Nothing is known of these threads in it.",
+        ("nodes", "tid", "callback_share", "callback_ns", "take_ns", "select_ns", "wait_ns",
+         "blocked_ns", "unknown_ns")),
 }  # fmt: skip
-_WHEN_EMPTY = {
-    "why": "No flow reached the end of a path.",
-    "callbacks": "No callback of these nodes began in it.",
-    "usage": "Nothing is known of these threads in it.",
-    "paths": "No flow reached the end of a path.",
-    "blame": "No flow reached the end of a path.",
-    "drops": "Nothing was dropped or lost, as far as the trace tells.",
-    "threads": "No thread of an executor ran a callback.",
-    "verdicts": "The file has no requirements.",
-    "change": "No path differs.",
-}
 
 
 @dataclass(frozen=True)
 class Section:
     """A part of the summary."""
 
-    # 'why', 'paths', 'blame', 'drops', 'threads', 'verdicts' or 'change'; of a part of the timeline
-    # 'callbacks' or 'usage'
-    name: str
+    name: str  # a key of _KINDS
     result: QueryResult  # its rows
     commands: tuple[str, ...]  # print the same numbers
     reading: str = ""  # a line before the rows
 
     @property
-    def title(self) -> str:
+    def kind(self) -> Kind:
         """What it is about."""
-        return _TITLES[self.name]
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Columns that matter most."""
-        return _COLUMNS[self.name]
-
-    @property
-    def when_empty(self) -> str:
-        """What to say where there are no rows."""
-        return _WHEN_EMPTY[self.name]
+        return _KINDS[self.name]
 
 
 def query_section(asked: Question, name: str, through: str = "") -> Section:
@@ -210,10 +204,96 @@ def encoded_comparison(comparison: Comparison, what: str, *, is_quick: bool = Fa
 def encoded_section(section: Section, origin_ns: int) -> bytes:
     """Return a section of the summary as bytes; points in time count from `origin_ns`."""
     meta = {
-        "title": section.title,
+        "title": section.kind.title,
         "reading": section.reading,
-        "when_empty": section.when_empty,
-        "shown": section.columns,
+        "when_empty": section.kind.when_empty,
+        "shown": section.kind.columns,
         "commands": section.commands,
     }
     return encode_result(section.result, meta, origin_ns)
+
+
+def markdown(
+    run: Run,
+    facts: Sequence[str],
+    notes: Sequence[str],
+    findings: Sequence[Finding],
+    sections: Sequence[Section],
+) -> str:
+    """Return the summary as Markdown."""
+    lines = [f"# {code(format_cell(run.name))}", "", ", ".join(facts), ""]
+    lines += [line for note in notes for line in (code(note), "")]
+    for section in sections:
+        lines += _section(section)
+        # What makes data late comes first; why the numbers may be wrong stands before them.
+        if section.name == "why":
+            lines += _findings(run, findings)
+    return "\n".join(lines)
+
+
+def _section(section: Section) -> Iterator[str]:
+    yield from (f"## {section.kind.title}", "")
+    if section.reading:
+        # Runs have names of their own.
+        reading = code(section.reading) if section.name == "change" else f"{section.reading}."
+        yield from (reading, "")
+    if len(section.result):
+        lines = {"blame": _flows, "why": _sentences}.get(section.name, _table)
+        yield from lines(section)
+    elif not section.reading:
+        yield from (section.kind.when_empty, "")
+    if section.commands:
+        yield from code_lines(section.commands)
+        yield ""
+
+
+def _table(section: Section) -> Iterator[str]:
+    result = section.result.with_columns(section.kind.columns)
+    names, columns, right = cells(result)
+    yield markdown_line(names)
+    yield rule_line(right)
+    for row in zip(*columns, strict=True):
+        # Names come from the trace: as code they are neither markup nor mentions.
+        yield markdown_line(
+            text if is_right or text == format_cell(None) else code(text)
+            for text, is_right in zip(row, right, strict=True)
+        )
+    yield ""
+
+
+def _sentences(section: Section) -> Iterator[str]:
+    for sentence in section.result.table["sentence"].to_pylist():
+        yield f"- {code(sentence)}"
+    yield ""
+
+
+def _flows(section: Section) -> Iterator[str]:
+    """Yield a line for each flow, and below it one for each node, the longest first."""
+    rows = section.result.table.to_pylist()
+    for _, group in groupby(rows, key=lambda row: row["rank"]):
+        nodes = list(group)
+        latency = format_cell(nodes[0]["latency_ns"], unit="ns")
+        yield f"- **{latency}**: {code(format_cell(nodes[0]['path']))}"
+        for node in nodes:
+            took = format_cell(node["duration_ns"], unit="ns")
+            share = format_cell(node["share"], unit="share")
+            yield f"  - {code(format_cell(node['node']))} {took}, {share} of it"
+    yield ""
+
+
+def _findings(run: Run, findings: Sequence[Finding]) -> Iterator[str]:
+    yield from ("## Findings", "")
+    if not findings:
+        yield from ("Nothing is wrong with the recording.", "")
+        return
+    for _, group in groupby(findings, key=lambda finding: finding.name):
+        places = list(group)
+        first = places[0]
+        yield f"- **{first.severity}**: {first.title}"
+        for place in places[:_MOST_PLACES]:
+            yield f"  - {code(format_cell(place.subject))}: {code(format_cell(place.detail))}"
+        if len(places) > _MOST_PLACES:
+            yield f"  - and {len(places) - _MOST_PLACES} more"
+        yield f"  - Cure: {first.cure}"
+    command = shell_joined(["msgflow", "check", "--run", run.name])
+    yield from ("", *code_lines([command]), "")

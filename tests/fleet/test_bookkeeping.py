@@ -21,13 +21,14 @@ from typer.testing import CliRunner
 from msgflow.cli.app import app
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet import ingest as fleet_ingest_module
-from msgflow.fleet import task_process, workers
+from msgflow.fleet import task as task_module
+from msgflow.fleet import workers
 from msgflow.fleet.file_store import Store, normal_url
 from msgflow.fleet.ingest import FleetProgress, fleet_ingest, is_in_shard
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import new_part
 from msgflow.fleet.pack import pack
-from msgflow.fleet.recording import look_at
+from msgflow.fleet.sources import look_at
 from msgflow.fleet.task import Options, Outcome, Task
 
 BROKEN = "broken"
@@ -293,8 +294,8 @@ def test_a_pack_is_refused_while_others_write(place: Path) -> None:
 
 def test_scratch_space_that_cannot_be_made_is_not_full(place: Path) -> None:
     Path("file").write_text("")
-    task = Task(0, str(place), str(place / "lake"), scratch=str(place / "file"))
-    found = task_process.run_task(task)
+    task = Task(str(place), str(place / "lake"), scratch=str(place / "file"))
+    found = task_module.run_task(task)
     assert (found.reason, found.stage) == ("no_scratch", "making scratch space")
 
 

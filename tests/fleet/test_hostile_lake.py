@@ -23,9 +23,9 @@ from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_query import fleet_sql
 from msgflow.fleet.layout import RUN_SCHEMA, database_path, new_part, part_path
-from msgflow.fleet.manifest import read_manifest
 from msgflow.fleet.pack import pack
 from msgflow.fleet.run_database import open_run
+from msgflow.fleet.sources import read_manifest
 from msgflow.trace import extraction
 from msgflow.version import __version__
 from msgflow_sim import simulate

@@ -23,12 +23,13 @@ from typer.testing import CliRunner, Result
 from msgflow import Database
 from msgflow.cli.app import app
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.fleet import child_process, task_process
+from msgflow.fleet import child_process
+from msgflow.fleet import task as task_module
 from msgflow.fleet.ingest import fleet_ingest
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import database_path, part_of, part_path
 from msgflow.fleet.pack import pack
-from msgflow.fleet.recording import State
+from msgflow.fleet.sources import State
 from msgflow.fleet.task import PASSING, Options, Outcome, Task, needs, without_secrets
 from msgflow.fleet.workers import OneProcess
 from msgflow.sql.failure import out_of_memory
@@ -218,11 +219,11 @@ def test_what_was_mended_is_tried_again(
 
 @pytest.fixture
 def task(filled: Filled) -> Task:
-    return Task(0, str(filled.recordings / "r0"), str(filled.lake), views=False, database=False)
+    return Task(str(filled.recordings / "r0"), str(filled.lake), views=False, database=False)
 
 
 def outcome(task: Task, **more: Any) -> Outcome:
-    return task_process.run_task(replace(task, **more))
+    return task_module.run_task(replace(task, **more))
 
 
 def test_what_hangs_or_grows_is_ended(task: Task, tmp_path: Path) -> None:
@@ -405,7 +406,7 @@ def test_a_lake_that_cannot_be_reached(filled: Filled, monkeypatch: pytest.Monke
 def test_secrets_are_in_no_text(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "hush-hush")
     assert without_secrets("denied for hush-hush") == "denied for …"
-    given = asdict(Task(0, "s3://bucket/x", "s3://bucket/lake"))
+    given = asdict(Task("s3://bucket/x", "s3://bucket/lake"))
     assert "hush" not in json.dumps(given)
 
 

@@ -15,10 +15,10 @@ import duckdb
 import pytest
 from lakes import content, copied, paths, read, rows_of
 
-from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import PACKED, VIEWS, part_of, run_path
 from msgflow.fleet.pack import pack
+from msgflow.fleet.part import ANSWERS
 
 Row = dict[str, Any]
 _TABLES = len(ANSWERS)

@@ -12,7 +12,6 @@ from lakes import EXAMPLE, PAGE, content, copied, paths, read, rows_of
 
 from msgflow import Database
 from msgflow.errors import DatabaseError, UsageError
-from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import (
@@ -26,7 +25,7 @@ from msgflow.fleet.layout import (
     view_path,
 )
 from msgflow.fleet.pack import pack
-from msgflow.fleet.part import write_part
+from msgflow.fleet.part import ANSWERS, write_part
 
 Row = dict[str, Any]
 

@@ -22,13 +22,13 @@ from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_connection import Reading, choose
 from msgflow.fleet.lake_query import (
+    STATEMENTS,
     fleet_query,
     fleet_sql,
     fleet_worst,
     header_of,
     lake_names,
     names,
-    statements,
 )
 from msgflow.fleet.part import write_part
 from msgflow.ingest import ingest
@@ -51,11 +51,11 @@ def test_headers_are_those_of_the_statements(night: Lake) -> None:
     with Reading(choose(night)) as reading:
         con = reading.connection
         con.execute("CREATE TABLE run_group AS SELECT run, 1::BIGINT AS label_group FROM run")
-        for name in statements().names():
-            header = statements().header(name)
+        for name in STATEMENTS.names():
+            header = STATEMENTS.header(name)
             if not header.columns:
                 continue
-            relation = statements().run(con, name, {"path": "x", "count": 1})
+            relation = STATEMENTS.run(con, name, {"path": "x", "count": 1})
             described = list(zip(relation.columns, map(str, relation.types), strict=True))
             assert described == [(column.name, column.type) for column in header.columns], name
 
@@ -360,8 +360,8 @@ def test_nobody_waits_for_pandas(night: Lake) -> None:
 
 
 def test_columns_of_headers_have_meanings() -> None:
-    for name in statements().names():
-        header = statements().header(name)
+    for name in STATEMENTS.names():
+        header = STATEMENTS.header(name)
         assert all(dataclasses.astuple(column)[3] for column in header.columns), name
 
 

@@ -14,9 +14,7 @@ from object_store import KEYS, ObjectStore, object_store
 
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.file_store import Store
-from msgflow.fleet.manifest import read_manifest
-from msgflow.fleet.recording import fetch, look_at
-from msgflow.fleet.sources import find_recordings
+from msgflow.fleet.sources import fetch, find_recordings, look_at, read_manifest
 
 pytestmark = pytest.mark.skipif(not find_spec("moto"), reason="moto[server] is not installed")
 

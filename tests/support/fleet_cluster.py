@@ -17,10 +17,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import part_path
+from msgflow.fleet.part import ANSWERS
 
 NODE = {
     "num_cpus": 1,

@@ -11,8 +11,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from msgflow.fleet.answers import ANSWERS
 from msgflow.fleet.layout import VIEWS, new_part, part_path
+from msgflow.fleet.part import ANSWERS
 
 if TYPE_CHECKING:
     from msgflow.fleet.lake import Lake

@@ -181,9 +181,12 @@ def test_bins_lose_nothing(demo: Path, read: Read) -> None:
     assert wrong == 0
 
 
-def test_a_level_put_together_says_the_same_as_bins_made_at_once(demo: Path, read: Read) -> None:
+def test_a_level_put_together_says_the_same_as_bins_made_at_once(
+    demo: Path, read: Read, monkeypatch: pytest.MonkeyPatch
+) -> None:
     connection = read(demo)
-    pages = Pages(most_bars=1)
+    monkeypatch.setattr("msgflow.view.pages.MOST_BARS", 1)
+    pages = Pages()
     content = decoded(pages.answer(connection, "segments", {}))
     bin_ns = content.meta["bin"]
     level_ns = Question(connection, {}).length_ns // LEVEL_BINS + 1

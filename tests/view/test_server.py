@@ -31,7 +31,7 @@ from msgflow.view.connection import timed
 from msgflow.view.page_query import Question
 from msgflow.view.pages import Pages
 from msgflow.view.server import is_local, listen, serving
-from msgflow.view.shared_database import Ahead, Turns
+from msgflow.view.shared_database import SharedDatabase, Turns
 
 Serve = Callable[[Path], Served]
 
@@ -430,32 +430,30 @@ def test_other_failures_are_not_tried_again() -> None:
     assert len(tries) == 1
 
 
-class Asked(Pages):
-    """Notes what it is asked, and runs a statement for it."""
-
-    def __init__(self, statement: str) -> None:
-        super().__init__()
-        self.statement = statement
-        self.asked: list[tuple[str, dict[str, Any]]] = []
-        self.is_asked = threading.Event()
+@pytest.mark.parametrize("statement", ["SELECT 1", "FROM nowhere", "FROM range(1000000000000)"])
+def test_the_timeline_is_counted_before_the_page_asks(
+    small_database: Path, monkeypatch: pytest.MonkeyPatch, statement: str
+) -> None:
+    """It is ended with the server, however long it takes; of what fails the page will be told."""
+    asked: list[tuple[str, dict[str, Any]]] = []
+    is_asked, is_ended = threading.Event(), threading.Event()
 
     def answer(
-        self, connection: duckdb.DuckDBPyConnection, name: str, params: dict[str, Any]
+        _: Pages, connection: duckdb.DuckDBPyConnection, name: str, params: dict[str, Any]
     ) -> bytes:
-        self.asked.append((name, params))
-        self.is_asked.set()
-        connection.execute(self.statement).fetchall()
-        return b""
+        asked.append((name, params))
+        is_asked.set()
+        if name == "segments":
+            try:
+                connection.execute(f"SELECT count(*) FROM ({statement})").fetchall()
+            finally:
+                is_ended.set()
+        return b"next"
 
-
-@pytest.mark.parametrize("statement", ["SELECT 1", "FROM nowhere", "FROM range(1000000000000)"])
-def test_the_timeline_is_counted_before_the_page_asks(statement: str) -> None:
-    """It is ended with the server, however long it takes; of what fails the page will be told."""
-    with duckdb.connect() as connection:
-        pages = Asked(f"SELECT count(*) FROM ({statement})")
-        turns = Turns()
-        ahead = Ahead(turns, pages, connection.cursor())
-        assert pages.is_asked.wait(10)
-        ahead.stop()
-        assert pages.asked == [("segments", {})]
-        assert turns.ask(lambda: b"next") == b"next"
+    monkeypatch.setattr(Pages, "answer", answer)
+    shared = SharedDatabase(small_database, None)
+    assert is_asked.wait(10)
+    assert shared.answer("run", {}, None, lambda _: None) == b"next"
+    shared.close()
+    assert is_ended.wait(0)
+    assert asked == [("segments", {}), ("run", {})]
