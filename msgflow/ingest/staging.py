@@ -18,7 +18,7 @@ from msgflow.db.transaction import transaction
 from msgflow.errors import UsageError
 from msgflow.files.atomic_directory import replacing_entries
 from msgflow.files.resources import resource_directory
-from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Predecessor, Tracepoint, load
+from msgflow.ingest.catalogue import COMMON_COLUMNS, Predecessor, Tracepoint, load
 from msgflow.sql.quoting import literal
 from msgflow.sql.statement import internal_sql
 from msgflow.trace import PACKET
@@ -124,7 +124,7 @@ def _predecessor_view(tracepoints: Sequence[Tracepoint]) -> str:
 
 
 def _event_predecessors(tracepoint: Tracepoint) -> list[Predecessor]:
-    return [each for each in tracepoint.predecessors if each.origin is Origin.EVENT_ID]
+    return [each for each in tracepoint.predecessors if each.origin == "event_id"]
 
 
 def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
