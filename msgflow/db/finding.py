@@ -18,15 +18,15 @@ say. The phase database is about msgflow itself: no ingest looks for what it can
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header
 from msgflow.sql.quoting import literal
-from msgflow.sql.statement import Statements
+from msgflow.sql.statement import Statements, with_rows
 
 if TYPE_CHECKING:
     import duckdb
@@ -97,6 +97,21 @@ def kinds() -> tuple[Header, ...]:
 def kinds_of(phase: str) -> tuple[Header, ...]:
     """Return the headers of the kinds of a phase, sorted by name."""
     return tuple(header for header in kinds() if phase_of(header) == phase)
+
+
+def kinds_with_rows(
+    con: duckdb.DuckDBPyConnection,
+    phase: str,
+    values: Mapping[str, Any],
+    rows_of: Callable[[str], str] = str,
+    empty: Collection[str] = (),
+) -> list[Header]:
+    """Return the kinds of a phase that may find something; of tables in `empty` nothing is read."""
+    sources = {source for kind in kinds_of(phase) for source in kind.sources}
+    filled = with_rows(con, [each for each in sources if each[0] not in empty], values, rows_of)
+    return [
+        kind for kind in kinds_of(phase) if not kind.sources or filled.intersection(kind.sources)
+    ]
 
 
 def phase_of(header: Header) -> str:

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
+from msgflow.db.store import empty
 from msgflow.db.transaction import transaction
-from msgflow.ingest import overlapping_traces, staging
+from msgflow.ingest import overlapping_traces
 from msgflow.ingest.catalogue import USER_EVENT, load
 from msgflow.ingest.cpus import Cpus
 from msgflow.ingest.sequences import Sequences
@@ -92,7 +93,7 @@ def load_traces(
     implausible = read(None)
     corrections = overlapping_traces.corrections_of(con)
     if corrections:
-        staging.empty(con)
+        empty(con, "raw")
         implausible = read(corrections)
     _insert(
         con,

@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
-from msgflow.db.finding import kinds_of, statement
+from msgflow.db.finding import kinds_with_rows, statement
 from msgflow.db.store_table import store_tables
 from msgflow.files.resources import resource_directory
 from msgflow.ingest import staging
@@ -65,11 +65,7 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
     `empty` names the tables that exist and have no row. This function keeps it up to date.
     """
     if header.name == _FINDING:
-        kinds = kinds_of("input")
-        sources = {source for kind in kinds for source in kind.sources if source[0] not in empty}
-        rows = {source: f"{source[0]} WHERE {source[1] or 'true'}" for source in sources}
-        filled = with_rows(con, rows, {})
-        found = [kind for kind in kinds if not kind.sources or filled.intersection(kind.sources)]
+        found = kinds_with_rows(con, "input", {}, empty=empty)
         header = replace(header, body=statement(found))
     if header.kind == "macro":
         con.execute(header.body)
@@ -91,11 +87,7 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
 def may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> bool:
     """Tell whether an object may have a row, by what `when` of its header says."""
     return not header.sources or any(
-        name not in empty
-        and (
-            not condition
-            or con.execute(f"SELECT 1 FROM {name} WHERE {condition} LIMIT 1").fetchall()
-        )
+        name not in empty and (not condition or with_rows(con, [(name, condition)], {}))
         for name, condition in header.sources
     )
 
@@ -114,25 +106,18 @@ def _last_uses(headers: tuple[Header, ...]) -> dict[str, int]:
     """
     stored = {f"staging.{name}" for name in store_tables()}
     unfolded = {header.name: header for header in headers if header.kind != "view"}
+
+    def needs_of(name: str) -> frozenset[str]:
+        return _needs(unfolded[name]) if name in unfolded else frozenset()
+
     last = dict.fromkeys(_raw_tables(), 0)
     for position, header in enumerate(headers):
         if header.kind == "view":
             last[header.name] = position
-            needs = set(_needs(header))
-            _unfold(needs, unfolded)
+            needs = objects.reached(_needs(header), needs_of)
             last |= dict.fromkeys(needs & last.keys(), position)
-    kept = set(stored)
-    _unfold(kept, unfolded)
+    kept = objects.reached(stored, needs_of)
     return {name: position for name, position in last.items() if name not in kept}
-
-
-def _unfold(names: set[str], unfolded: Mapping[str, Header]) -> None:
-    """Add what the objects among `names` that are not tables need themselves."""
-    waiting = [name for name in names if name in unfolded]
-    while waiting:
-        needs = _needs(unfolded[waiting.pop()]) - names
-        names |= needs
-        waiting += [name for name in needs if name in unfolded]
 
 
 @functools.cache
@@ -146,4 +131,4 @@ def _needs(header: Header) -> frozenset[str]:
 
 @functools.cache
 def _raw_tables() -> frozenset[str]:
-    return frozenset(f"raw.{table}" for table in staging.event_tables())
+    return frozenset(f"raw.{tracepoint.table}" for tracepoint in load().staged.values())

@@ -71,18 +71,6 @@ def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
     con.execute(_predecessor_view([each for each in left if _event_predecessors(each)] or known))
 
 
-def empty(con: duckdb.DuckDBPyConnection) -> None:
-    """Empty `raw`, to read everything again."""
-    others = ("packet", "thread", "thread_name", "cpu_return", "interrupt")
-    for table in (*event_tables(), *others):
-        con.execute(f"TRUNCATE raw.{table}")
-
-
-def event_tables() -> tuple[str, ...]:
-    """Return the tables of `raw` that events are read into, without their schema."""
-    return tuple(tracepoint.table for tracepoint in load().staged.values())
-
-
 @contextlib.contextmanager
 def writing(con: duckdb.DuckDBPyConnection) -> Iterator[None]:
     """Write staged tables once, without compression, inside this block.
