@@ -34,8 +34,8 @@ ROWS_PER_INSERT = 122_880
 # Rows of all tables that wait for an insert.
 MOST_WAITING = 500_000
 
-OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
-"""Views of all events, which unite the tables of all tracepoints."""
+# Views of all events, which unite the tables of all tracepoints.
+_OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
 
 
 def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
@@ -126,7 +126,7 @@ def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
     files = {
         f"{name}.parquet": name
         for (name,) in found
-        if name not in OF_ALL_EVENTS and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall()
+        if name not in _OF_ALL_EVENTS and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall()
     }
     with replacing_entries(directory, list(files), force=True) as aside:
         for file, name in files.items():
