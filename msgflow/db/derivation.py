@@ -112,7 +112,7 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
     whole = _header(f"derive.{name}")
     for header in (whole, *map(_header, whole.also)):
-        if _may_have_rows(con, header, run_id):
+        if may_have_rows(con, header.sources, {"run_id": run_id}, _of_run):
             text = (
                 f"INSERT INTO store.{name} ({columns}) {_united(con, header, run_id)}"
                 f"SELECT {columns} FROM {_of_run(header.name)}"
@@ -121,16 +121,14 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
             con.execute(text, {"run_id": run_id, **recorded(con, parts)})
 
 
-def _may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> bool:
-    """Tell whether an object may have rows of a run, as the `when` of its header says."""
-    return may_have_rows(con, header.sources, {"run_id": run_id}, _of_run)
-
-
 def _united(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> str:
     """Return the WITH clause for the objects that one unites, of those that may have rows."""
     if not header.unites:
         return ""
-    parts = [name for name in header.unites if _may_have_rows(con, _header(name), run_id)]
+    values = {"run_id": run_id}
+    parts = [
+        name for name in header.unites if may_have_rows(con, _header(name).sources, values, _of_run)
+    ]
     rows = " UNION ALL BY NAME ".join(f"FROM {_of_run(name)}" for name in parts)
     return f"WITH united AS MATERIALIZED ({rows}) "
 

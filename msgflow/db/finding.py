@@ -31,7 +31,6 @@ from msgflow.sql.statement import Statements, with_rows
 if TYPE_CHECKING:
     import duckdb
 
-PHASES = ("input", "recording", "database")
 SEVERITIES = ("error", "warning", "info")
 
 # Gives the columns that a query may leave out, and the types of all.

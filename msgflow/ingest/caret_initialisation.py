@@ -42,12 +42,11 @@ def restore(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
     tables = [f"raw.{each.table}" for each in (*(again for again, _ in reported), *moved)]
     if all(table in empty for table in tables):
         return False
+    events = " UNION ALL ".join(f"SELECT event_id, init_timestamp FROM {each}" for each in tables)
     con.execute(
         "CREATE TEMP TABLE reported AS SELECT event_id, "
         f"{_BEFORE} + row_number() OVER (ORDER BY init_timestamp NULLS FIRST, event_id) AS place "
-        "FROM ("
-        + " UNION ALL ".join(f"SELECT event_id, init_timestamp FROM {table}" for table in tables)
-        + ")"
+        f"FROM ({events})"
     )
     for again, first in reported:
         con.execute(_insert(again, first))

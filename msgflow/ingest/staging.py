@@ -20,7 +20,7 @@ from msgflow.files.atomic_directory import replacing_entries
 from msgflow.files.resources import resource_directory
 from msgflow.ingest.catalogue import COMMON_COLUMNS, Predecessor, Tracepoint, load
 from msgflow.sql.quoting import literal
-from msgflow.sql.statement import internal_sql
+from msgflow.sql.statement import internal_sql, registered
 from msgflow.trace import PACKET
 
 if TYPE_CHECKING:
@@ -179,11 +179,8 @@ class RawTables:
             self._uncommitted = 0
 
     def _same_packets(self, rows: pa.RecordBatch) -> set[int]:
-        self._con.register("packet_batch", rows)
-        try:
+        with registered(self._con, packet_batch=rows):
             runs = self._con.execute(internal_sql().text("known_packet")).fetchall()
-        finally:
-            self._con.unregister("packet_batch")
         if runs and not self._may_replace:
             raise UsageError(
                 f"these packets are in the database already — run {runs[0][1]} ({runs[0][0]})",

@@ -83,9 +83,7 @@ class Interrupts:
             return is_in_time
 
 
-# Windows has no terminal that goes away.
-_GONE = [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []
-SIGNALS = (signal.SIGINT, signal.SIGTERM, *_GONE)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """The signals that end a command cleanly."""
 
 

@@ -155,7 +155,9 @@ def with_rows(
 
 
 @contextmanager
-def registered(connection: duckdb.DuckDBPyConnection, **tables: pa.Table) -> Iterator[None]:
+def registered(
+    connection: duckdb.DuckDBPyConnection, **tables: pa.Table | pa.RecordBatch
+) -> Iterator[None]:
     """Let statements read tables of this program, by their names, until the block ends."""
     for name, table in tables.items():
         connection.register(name, table)
