@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
 import duckdb
@@ -40,7 +41,7 @@ _UNPRINTABLE = r"[\p{C}\p{Zl}\p{Zp}]"
 _REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 
 
-class Sequencer:
+class Sequencer(AbstractContextManager["Sequencer"]):
     """Renders rounds of events; a context manager."""
 
     def __init__(self, traces: Sequence[TraceInfo], rendering: Rendering) -> None:
@@ -59,9 +60,6 @@ class Sequencer:
             }
         )
         self._connection.register("host", hosts)
-
-    def __enter__(self) -> Sequencer:
-        return self
 
     def __exit__(self, *exception: object) -> None:
         self._connection.close()

@@ -18,7 +18,7 @@ from msgflow.db.transaction import transaction
 from msgflow.errors import UsageError
 from msgflow.files.atomic_directory import replacing_entries
 from msgflow.files.resources import resource_directory
-from msgflow.ingest.catalogue import COMMON_COLUMNS, Predecessor, Tracepoint, load
+from msgflow.ingest.catalogue import COMMON_COLUMNS, Tracepoint, load
 from msgflow.sql.quoting import literal
 from msgflow.sql.statement import internal_sql, registered
 from msgflow.trace import PACKET
@@ -34,6 +34,7 @@ ROWS_PER_INSERT = 122_880
 # Rows of all tables that wait for an insert.
 MOST_WAITING = 500_000
 
+_COLUMNS = ", ".join(name for name, _ in COMMON_COLUMNS)
 # Views of all events, which unite the tables of all tracepoints.
 _OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
 
@@ -67,8 +68,21 @@ def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
     """Create the views of all events over the tables that have rows: empty ones cost planning."""
     known = [each for each in load().of_threads if not each.is_translated]
     left = [each for each in known if f"raw.{each.table}" not in empty]
-    con.execute(_event_view(left or known))
-    con.execute(_predecessor_view([each for each in left if _event_predecessors(each)] or known))
+    events = [f"SELECT {_COLUMNS} FROM raw.{each.table}" for each in left or known]
+    pointers = _predecessors(left) or _predecessors(known)
+    for view, selects in (("event", events), ("predecessor", pointers)):
+        rows = "\nUNION ALL\n".join(selects)
+        con.execute(f"CREATE OR REPLACE VIEW staging.{view} AS\n{rows}")
+
+
+def _predecessors(tracepoints: Sequence[Tracepoint]) -> list[str]:
+    return [
+        f"SELECT {_COLUMNS}, '{before.sequence}' AS sequence, {before.column} AS previous_event_id "
+        f"FROM raw.{tracepoint.table}"
+        for tracepoint in tracepoints
+        for before in tracepoint.predecessors
+        if before.origin == "event_id"
+    ]
 
 
 @contextlib.contextmanager
@@ -90,29 +104,6 @@ def leave(con: duckdb.DuckDBPyConnection) -> None:
     This holds for all databases of the connection: the target needs a checkpoint before.
     """
     con.execute("PRAGMA disable_checkpoint_on_shutdown")
-
-
-def _event_view(tracepoints: Sequence[Tracepoint]) -> str:
-    columns = ", ".join(name for name, _ in COMMON_COLUMNS)
-    selects = "\nUNION ALL\n".join(
-        f"SELECT {columns} FROM raw.{tracepoint.table}" for tracepoint in tracepoints
-    )
-    return f"CREATE OR REPLACE VIEW staging.event AS\n{selects}"
-
-
-def _predecessor_view(tracepoints: Sequence[Tracepoint]) -> str:
-    columns = ", ".join(name for name, _ in COMMON_COLUMNS)
-    selects = "\nUNION ALL\n".join(
-        f"SELECT {columns}, '{before.sequence}' AS sequence, {before.column} AS previous_event_id "
-        f"FROM raw.{tracepoint.table}"
-        for tracepoint in tracepoints
-        for before in _event_predecessors(tracepoint)
-    )
-    return f"CREATE OR REPLACE VIEW staging.predecessor AS\n{selects}"
-
-
-def _event_predecessors(tracepoint: Tracepoint) -> list[Predecessor]:
-    return [each for each in tracepoint.predecessors if each.origin == "event_id"]
 
 
 def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
