@@ -23,6 +23,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from msgflow.db.store_table import store_tables
 from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header
 from msgflow.sql.quoting import literal
@@ -203,8 +204,6 @@ def commands_after(findings: Sequence[Finding]) -> list[str]:
 
 def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:
     """Return the broken rules of all runs, or of one, in the order of `read_findings`."""
-    from msgflow.db.relation_check import broken_relations
-
     headers = kinds_of("database")
     rows = con.execute(
         f"SELECT {', '.join(Finding.__dataclass_fields__)} "
@@ -215,6 +214,32 @@ def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> l
         {"run_id": run_id, "broken": broken_relations(con, run_id)},
     ).fetchall()
     return sorted((Finding(*row) for row in rows), key=_order)
+
+
+def broken_relations(
+    con: duckdb.DuckDBPyConnection, run_id: int | None = None
+) -> list[dict[str, Any]]:
+    """Return the columns with identities that no row of their run has where they refer to.
+
+    `store.sql` marks the columns that refer to another table. The databases have no foreign keys.
+    A row of another run does not count: nothing is linked across runs.
+
+    Returns:
+        For each run and column: `run_id`, `child` ('table.column'), `parent` (a table) and `count`.
+    """
+    of_run = "" if run_id is None else f"AND run_id = {run_id:d} "
+    selects = [
+        f"SELECT run_id, '{name}.{column.name}', '{column.to}', count(*) "
+        f"FROM store.{name} AS child ANTI JOIN store.{column.to} AS parent "
+        f"ON child.{column.name} = parent.{column.to}_id AND child.run_id = parent.run_id "
+        f"WHERE {column.name} IS NOT NULL {of_run}GROUP BY run_id"
+        for name, table in sorted(store_tables().items())
+        for column in table.columns.values()
+        if column.to
+    ]
+    # One statement: each takes longer to plan than its few rows to count.
+    rows = con.execute(" UNION ALL ".join(selects)).fetchall()
+    return [dict(zip(("run_id", "child", "parent", "count"), row, strict=True)) for row in rows]
 
 
 def _order(finding: Finding) -> tuple[int, str, int, str, int, str]:

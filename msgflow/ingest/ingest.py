@@ -108,9 +108,7 @@ def ingest(
     Everything happens in one transaction; a new database appears only when it is complete. Ctrl-C
     ends the ingest until the run is stored, and is ignored while it is being finished after that.
 
-    `memory_limit` is the most memory that the database takes, such as '4GB'. When None, it is a
-    quarter of that of the machine, at least 500 MB and at most 4 GB. `traces` are what to read, if
-    they were opened before; `paths` only give the run its name then.
+    `traces` are what to read, if they were opened before; `paths` only give the run its name then.
     """
     if "" in paths:
         raise UsageError(
@@ -249,17 +247,14 @@ class _Watch:
     ) -> None:
         self._report = report
         self._interrupts = interrupts
-        self._seconds: dict[str, float] = {}
-        self._stage: str | None = None
-        self._since = 0.0
+        self._begins: dict[str, float] = {}  # of the stages, in their order
         self._events = 0
         self._rate = 0.0
 
     def enter(self, stage: str) -> None:
         """Begin a stage, unless Ctrl-C came during the one before."""
         self._interrupts.check()
-        self._close()
-        self._stage, self._since = stage, time.monotonic()
+        self._begins[stage] = time.monotonic()
         self._tell(None)
 
     def reading(self, state: Progress, seconds: float) -> None:
@@ -268,14 +263,12 @@ class _Watch:
         self._tell(state.fraction)
 
     def finish(self) -> Mapping[str, float]:
-        self._close()
-        return dict(self._seconds)
-
-    def _close(self) -> None:
-        if self._stage is not None:
-            self._seconds[self._stage] = time.monotonic() - self._since
-            self._stage = None
+        """Return how long each stage took."""
+        stages, begins = list(self._begins), list(self._begins.values())
+        ends = [*begins[1:], time.monotonic()]
+        return {stage: end - begin for stage, begin, end in zip(stages, begins, ends, strict=True)}
 
     def _tell(self, fraction: float | None) -> None:
-        if self._report is not None and self._stage is not None:
-            self._report(IngestProgress(self._stage, self._events, fraction, self._rate))
+        if self._report is not None:
+            stage = next(reversed(self._begins))
+            self._report(IngestProgress(stage, self._events, fraction, self._rate))

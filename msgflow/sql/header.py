@@ -385,9 +385,9 @@ def _sources(text: str) -> tuple[tuple[str, str], ...]:
 
 def _like(name: str, path: Path) -> Header:
     room, _, stem = name.rpartition(".")
-    if room == "main":
-        return _declaring(resource_directory("schema") / "public" / f"{stem}.sql")
-    return _declaring((resource_directory(room) if room else path.parent) / f"{stem}.sql")
+    room = "schema/public" if room == "main" else room
+    folder = resource_directory(room) if room else path.parent
+    return _declaring(folder / f"{stem}.sql")
 
 
 _declaring = cache(read)
