@@ -149,8 +149,7 @@ class Catalogue:
     @property
     def interrupts(self) -> tuple[str, ...]:
         """Kinds of interrupts, in alphabetical order."""
-        kinds = {t.interrupt for t in self.tracepoints.values() if t.interrupt is not None}
-        return tuple(sorted(kinds))
+        return tuple(sorted({t.interrupt for t in self.tracepoints.values() if t.interrupt}))
 
     @cached_property
     def in_traces(self) -> Mapping[str, Tracepoint]:
