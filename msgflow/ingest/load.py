@@ -64,6 +64,9 @@ def load_traces(
         wanted.pop(name, None)
     wanted |= dict.fromkeys(user_names)
     sources = list(_sources(traces.traces, hostnames))
+    # A host is a clock and a name, as in `schema/model/identity/host.sql`.
+    numbers: dict[tuple[object, object], int] = {}
+    hosts = [numbers.setdefault((row[7], row[4]), len(numbers)) for row in sources]
     _insert(con, "source", sources)
     started = time.monotonic()
 
@@ -77,7 +80,7 @@ def load_traces(
     def read(corrections: Corrections | None) -> Counter[tuple[str, str, str]]:
         batches = traces.batches(wanted, progress=report)
         implausible: Counter[tuple[str, str, str]] = Counter()
-        sequences, cpus = Sequences(catalogue, _hosts(sources)), Cpus(catalogue)
+        sequences, cpus = Sequences(catalogue, hosts), Cpus(catalogue)
         with transaction(con), con.cursor() as beside:
             # A thread reads the next round while DuckDB inserts this one.
             placed = _placed(batches, sequences, cpus, corrections, implausible, beside)
@@ -201,12 +204,6 @@ def _sources(
             trace.clock_correction_ns,
             trace.clock_offset_ns + trace.clock_correction_ns,
         )
-
-
-def _hosts(sources: Sequence[Sequence[object]]) -> list[int]:
-    """Number the hosts of traces: (clock, hostname), see `schema/model/identity/host.sql`."""
-    numbers: dict[tuple[object, object], int] = {}
-    return [numbers.setdefault((row[7], row[4]), len(numbers)) for row in sources]
 
 
 def plausible(
