@@ -66,7 +66,7 @@ def read_clock_sync(given: str | Path) -> ClockSync:
     path = Path(given)
     text = read_text(path, f"neither {' nor '.join(METHODS)} nor a file that can be read", _EXAMPLE)
     file = YamlFile(path, _EXAMPLE, _EXAMPLE, text)
-    entries = _toml(text, file) if _is_toml(path) else _yaml(file)
+    entries = _toml(text, file) if path.suffix == ".toml" else _yaml(file)
     clocks = tuple(_clock(file, *entry) for entry in entries)
     if not clocks:
         file.fail(1, "the file names no clock", _EXAMPLE)
@@ -75,10 +75,6 @@ def read_clock_sync(given: str | Path) -> ClockSync:
 
 # Both yield: name, its line, and its fields with their lines; a number alone is the offset.
 _Entry = tuple[str, int, dict[str, tuple[str, int]]]
-
-
-def _is_toml(path: Path) -> bool:
-    return path.suffix == ".toml"
 
 
 def _toml(text: str, file: YamlFile) -> Iterator[_Entry]:
@@ -145,7 +141,8 @@ def _clock(file: YamlFile, name: str, line: int, fields: dict[str, tuple[str, in
     numbers: dict[str, int] = {}
     for key, (text, field_line) in fields.items():
         if key not in FIELDS:
-            quoted = "; a name with dots stands in quotes" if _is_toml(file.path) else ""
+            is_toml = file.path.suffix == ".toml"
+            quoted = "; a name with dots stands in quotes" if is_toml else ""
             file.fail(field_line, f"a clock has no {key}", f"it has {', '.join(FIELDS)}{quoted}")
         if not text:
             file.fail(field_line, f"{key} has no value", _EXAMPLE)

@@ -92,10 +92,14 @@ def _set_given(
             clock for clock in clocks if given.name in clock[2]
         ]
         if not found:
+            known = ", ".join(
+                " and ".join(hostnames) + ("" if uuid is None else f" ({uuid})")
+                for _, uuid, hostnames in clocks
+            )
             file.fail(
                 given.line,
                 f"the run has no host or clock of that name — {given.name}",
-                f"it has {_known(clocks)}",
+                f"it has {known}",
             )
         if len(found) > 1:
             uuids = ", ".join(str(uuid) for _, uuid, _ in found)
@@ -126,10 +130,3 @@ def _set_given(
             "drift_uncertainty_ppb = 0 WHERE clock_id = ?",
             others,
         )
-
-
-def _known(clocks: list[tuple[int, str | None, list[str]]]) -> str:
-    return ", ".join(
-        f"{' and '.join(hostnames)}" + ("" if uuid is None else f" ({uuid})")
-        for _, uuid, hostnames in clocks
-    )

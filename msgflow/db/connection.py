@@ -20,43 +20,9 @@ from msgflow.db.empty_database import write_empty
 from msgflow.db.objects import definition_hash, head_revision, known_revisions
 from msgflow.db.sandbox import open_file, opening, remove_abandoned_spills, require_file
 from msgflow.errors import DatabaseError
+from msgflow.files.resources import resource_directory
 from msgflow.sql.failure import database_errors
 from msgflow.sql.quoting import literal
-
-# Keys are left out: their place in the statement differs, and they hold no SQL.
-_RENDERED = r"""
-SELECT 'view ' || schema_name || '.' || view_name AS name, sql
-FROM duckdb_views()
-WHERE NOT internal AND database_name = current_database()
-    AND schema_name IN ('store', 'main', 'derive')
-UNION ALL
-SELECT
-    'macro ' || schema_name || '.' || function_name,
-    string_agg(
-        concat_ws(chr(0), function_type, parameters::VARCHAR, macro_definition), chr(0)
-        ORDER BY function_type, parameters::VARCHAR, macro_definition
-    )
-FROM duckdb_functions()
-WHERE NOT internal AND database_name = current_database()
-    AND schema_name IN ('store', 'main', 'derive')
-GROUP BY schema_name, function_name
-UNION ALL
-SELECT
-    'table ' || schema_name || '.' || table_name,
-    regexp_replace(sql, ',? PRIMARY KEY(\([^)]*\))?', '', 'g')
-FROM duckdb_tables()
-WHERE database_name = current_database() AND schema_name IN ('store', 'main', 'derive')
-    AND table_name <> 'alembic_version'
-UNION ALL
-SELECT 'trigger ' || schema_name || '.' || trigger_name, coalesce(sql, '')
-FROM duckdb_triggers()
-WHERE database_name = current_database()
-UNION ALL
-SELECT 'type ' || schema_name || '.' || type_name, ''
-FROM duckdb_types()
-WHERE NOT internal AND database_name = current_database()
-    AND schema_name IN ('store', 'main', 'derive')
-"""
 
 
 def connect(
@@ -176,7 +142,8 @@ def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:
 
 def definitions(con: duckdb.DuckDBPyConnection) -> dict[str, str]:
     """Return the definitions in the current database by kind and name; read none of its tables."""
-    return dict(con.execute(_RENDERED).fetchall())
+    text = (resource_directory("schema") / "definitions.sql").read_text(encoding="utf-8")
+    return dict(con.execute(text).fetchall())
 
 
 def require_ours(con: duckdb.DuckDBPyConnection, path: Path) -> None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
-from msgflow.db.finding import kinds_of, store_findings
+from msgflow.db.finding import kinds_with_rows, store_findings
 from msgflow.db.store_table import store_tables
-from msgflow.sql.statement import RECORDED, recorded, with_rows
+from msgflow.sql.statement import RECORDED, may_have_rows, recorded
 
 if TYPE_CHECKING:
     import duckdb
@@ -64,9 +64,7 @@ def derive_from_clocks(
 
 def derive_findings(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     """Find anew what a recording shows, inside the open transaction."""
-    kinds = kinds_of("recording")
-    filled = _with_rows(con, {source for kind in kinds for source in kind.sources}, run_id)
-    found = [kind for kind in kinds if not kind.sources or filled.intersection(kind.sources)]
+    found = kinds_with_rows(con, "recording", {"run_id": run_id}, _of_run)
     store_findings(con, run_id, found)
 
 
@@ -114,7 +112,7 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
     con.execute(f"DELETE FROM store.{name} WHERE run_id = ?", [run_id])
     whole = _header(f"derive.{name}")
     for header in (whole, *map(_header, whole.also)):
-        if _may_have_rows(con, header, run_id):
+        if may_have_rows(con, header.sources, {"run_id": run_id}, _of_run):
             text = (
                 f"INSERT INTO store.{name} ({columns}) {_united(con, header, run_id)}"
                 f"SELECT {columns} FROM {_of_run(header.name)}"
@@ -123,27 +121,14 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
             con.execute(text, {"run_id": run_id, **recorded(con, parts)})
 
 
-def _may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> bool:
-    """Tell whether an object may have rows of a run, as the `when` of its header says."""
-    return not header.sources or bool(_with_rows(con, header.sources, run_id))
-
-
-def _with_rows(
-    con: duckdb.DuckDBPyConnection, sources: Iterable[tuple[str, str]], run_id: int
-) -> set[tuple[str, str]]:
-    """Return which tables, views or macros have a row of a run for which their condition holds."""
-    rows = {
-        (name, condition): _of_run(name) + (f" AND ({condition})" if condition else "")
-        for name, condition in sources
-    }
-    return with_rows(con, rows, {"run_id": run_id})
-
-
 def _united(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> str:
     """Return the WITH clause for the objects that one unites, of those that may have rows."""
     if not header.unites:
         return ""
-    parts = [name for name in header.unites if _may_have_rows(con, _header(name), run_id)]
+    values = {"run_id": run_id}
+    parts = [
+        name for name in header.unites if may_have_rows(con, _header(name).sources, values, _of_run)
+    ]
     rows = " UNION ALL BY NAME ".join(f"FROM {_of_run(name)}" for name in parts)
     return f"WITH united AS MATERIALIZED ({rows}) "
 
@@ -151,7 +136,7 @@ def _united(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> str:
 def _of_run(name: str) -> str:
     """Return what follows FROM for the rows of the run `$run_id`."""
     if name.startswith("store.") or _header(name).kind == "view":
-        return f"{name} WHERE run_id = $run_id"
+        return f"(FROM {name} WHERE run_id = $run_id)"
     header = _header(name)
     words = ["'united'"] if header.unites else []
     parts = (f"{part} := ${part}" for part in RECORDED if f"{part} := true" in header.body)

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import duckdb
@@ -35,8 +34,15 @@ def write_empty(path: Path) -> None:
         path.write_bytes(content)
         return
     with contextlib.closing(open_file(path, read_only=False)) as con:
+        scripts = (
+            store_file().read_text(encoding="utf-8"),
+            # As Alembic makes it.
+            "CREATE TABLE store.alembic_version (version_num VARCHAR(32) NOT NULL, "
+            "CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num))",
+            f"INSERT INTO store.alembic_version VALUES ({literal(objects.head_revision())})",
+        )
         with transaction(con):
-            for script in _scripts():
+            for script in scripts:
                 # One by one: what looks at a statement before it runs, such as EXPLAIN, sees it.
                 for statement in con.extract_statements(script):
                     con.execute(statement)
@@ -72,14 +78,3 @@ def _cache_file() -> Path:
     made_by = (__version__, objects.head_revision(), objects.definition_hash(), STORAGE_VERSION)
     key = hashlib.sha256("\0".join(made_by).encode()).hexdigest()[:32]
     return root / "msgflow" / f"database-{duckdb.__version__}-{key}"
-
-
-def _scripts() -> Iterator[str]:
-    yield store_file().read_text(encoding="utf-8")
-    # As Alembic makes it.
-    yield (
-        "CREATE TABLE store.alembic_version (version_num VARCHAR(32) NOT NULL, "
-        "CONSTRAINT alembic_version_pkc PRIMARY KEY (version_num))"
-    )
-    revision = literal(objects.head_revision())
-    yield f"INSERT INTO store.alembic_version (version_num) VALUES ({revision})"

@@ -18,20 +18,20 @@ say. The phase database is about msgflow itself: no ingest looks for what it can
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from msgflow.db.store_table import store_tables
 from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header
 from msgflow.sql.quoting import literal
-from msgflow.sql.statement import Statements
+from msgflow.sql.statement import Statements, with_rows
 
 if TYPE_CHECKING:
     import duckdb
 
-PHASES = ("input", "recording", "database")
 SEVERITIES = ("error", "warning", "info")
 
 # Gives the columns that a query may leave out, and the types of all.
@@ -97,6 +97,21 @@ def kinds() -> tuple[Header, ...]:
 def kinds_of(phase: str) -> tuple[Header, ...]:
     """Return the headers of the kinds of a phase, sorted by name."""
     return tuple(header for header in kinds() if phase_of(header) == phase)
+
+
+def kinds_with_rows(
+    con: duckdb.DuckDBPyConnection,
+    phase: str,
+    values: Mapping[str, Any],
+    rows_of: Callable[[str], str] = str,
+    empty: Collection[str] = (),
+) -> list[Header]:
+    """Return the kinds of a phase that may find something; of tables in `empty` nothing is read."""
+    sources = {source for kind in kinds_of(phase) for source in kind.sources}
+    filled = with_rows(con, [each for each in sources if each[0] not in empty], values, rows_of)
+    return [
+        kind for kind in kinds_of(phase) if not kind.sources or filled.intersection(kind.sources)
+    ]
 
 
 def phase_of(header: Header) -> str:
@@ -189,8 +204,6 @@ def commands_after(findings: Sequence[Finding]) -> list[str]:
 
 def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:
     """Return the broken rules of all runs, or of one, in the order of `read_findings`."""
-    from msgflow.db.relation_check import broken_relations
-
     headers = kinds_of("database")
     rows = con.execute(
         f"SELECT {', '.join(Finding.__dataclass_fields__)} "
@@ -201,6 +214,32 @@ def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> l
         {"run_id": run_id, "broken": broken_relations(con, run_id)},
     ).fetchall()
     return sorted((Finding(*row) for row in rows), key=_order)
+
+
+def broken_relations(
+    con: duckdb.DuckDBPyConnection, run_id: int | None = None
+) -> list[dict[str, Any]]:
+    """Return the columns with identities that no row of their run has where they refer to.
+
+    `store.sql` marks the columns that refer to another table. The databases have no foreign keys.
+    A row of another run does not count: nothing is linked across runs.
+
+    Returns:
+        For each run and column: `run_id`, `child` ('table.column'), `parent` (a table) and `count`.
+    """
+    of_run = "" if run_id is None else f"AND run_id = {run_id:d} "
+    selects = [
+        f"SELECT run_id, '{name}.{column.name}', '{column.to}', count(*) "
+        f"FROM store.{name} AS child ANTI JOIN store.{column.to} AS parent "
+        f"ON child.{column.name} = parent.{column.to}_id AND child.run_id = parent.run_id "
+        f"WHERE {column.name} IS NOT NULL {of_run}GROUP BY run_id"
+        for name, table in sorted(store_tables().items())
+        for column in table.columns.values()
+        if column.to
+    ]
+    # One statement: each takes longer to plan than its few rows to count.
+    rows = con.execute(" UNION ALL ".join(selects)).fetchall()
+    return [dict(zip(("run_id", "child", "parent", "count"), row, strict=True)) for row in rows]
 
 
 def _order(finding: Finding) -> tuple[int, str, int, str, int, str]:

@@ -21,11 +21,11 @@ from msgflow.db.connection import (
     definitions,
     has_current_views,
     is_empty,
-    recorded_revision,
     require_known,
     require_ours,
     require_tables,
 )
+from msgflow.db.derivation import derive, stale_runs
 from msgflow.db.empty_database import write_empty
 from msgflow.db.sandbox import open_file
 from msgflow.db.transaction import transaction
@@ -85,7 +85,7 @@ def upgrade(path: Path) -> Upgrade:
             before = None if is_empty(con) else require_known(con, path)
             if before is not None:
                 views_changed = not _has_our_views(con, path)
-                rederived = _bring_to_head(con, path)
+                rederived = _bring_to_head(con, path, before)
         if before is None:
             # A file of our own: the format of this one depends on the program that made it.
             _replace_by_new(path)
@@ -100,16 +100,18 @@ def _has_our_views(con: duckdb.DuckDBPyConnection, path: Path) -> bool:
     return False
 
 
-def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path) -> tuple[str, ...]:
+def _bring_to_head(con: duckdb.DuckDBPyConnection, path: Path, revision: str) -> tuple[str, ...]:
     """Return the names of the runs whose links were derived again."""
-    revision = recorded_revision(con)
     is_older = revision != objects.head_revision()
     # Migrations and views need their tables. Before the first release, others had revisions of the
     # same names.
-    require_tables(con, path, _definitions_of(revision) if revision and is_older else None)
+    require_tables(con, path, _definitions_of(revision) if is_older else None)
     with migrated(con) if is_older else transaction(con) as changing:
         objects.apply(changing)
-        return _rederive(changing)
+        stale = stale_runs(changing)
+        for run_id, _ in stale:
+            derive(changing, run_id)
+    return tuple(name for _, name in stale)
 
 
 def _definitions_of(revision: str) -> Mapping[str, str]:
@@ -121,15 +123,6 @@ def _definitions_of(revision: str) -> Mapping[str, str]:
                 pass
         with duckdb.connect(str(path), read_only=True) as con:
             return definitions(con)
-
-
-def _rederive(con: duckdb.DuckDBPyConnection) -> tuple[str, ...]:
-    from msgflow.db.derivation import derive, stale_runs
-
-    stale = stale_runs(con)
-    for run_id, _ in stale:
-        derive(con, run_id)
-    return tuple(name for _, name in stale)
 
 
 @contextmanager

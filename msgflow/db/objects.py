@@ -118,7 +118,12 @@ def definition_hash() -> str:
 
     This reads the files without parsing them, so that a database opens quickly.
     """
-    return hash_of(_texts())
+    root = resource_directory("schema")
+    layers = (*VIEW_LAYERS, HEALTH)
+    in_layers = (path for layer in layers for path in sorted((root / layer).rglob("*.sql")))
+    modules = (Path(__file__).with_name(name) for name in _MODULES)
+    paths = (store_file(), *in_layers, *modules)
+    return hash_of(text for path in paths for text in (path.name, path.read_text(encoding="utf-8")))
 
 
 def sources_of(names: Iterable[str]) -> frozenset[str]:
@@ -127,22 +132,11 @@ def sources_of(names: Iterable[str]) -> frozenset[str]:
     found: set[str] = set()
     waiting = list(names)
     while waiting:
-        name = waiting.pop()
-        if name not in found:
+        if (name := waiting.pop()) not in found:
             found.add(name)
             if name in by_name:
                 waiting += [*by_name[name].needs, *sources(by_name, name)]
     return frozenset(found)
-
-
-def _texts() -> Iterable[str]:
-    root = resource_directory("schema")
-    layers = (*VIEW_LAYERS, HEALTH)
-    in_layers = (path for layer in layers for path in sorted((root / layer).rglob("*.sql")))
-    modules = (Path(__file__).with_name(name) for name in _MODULES)
-    for path in (store_file(), *in_layers, *modules):
-        yield path.name
-        yield path.read_text(encoding="utf-8")
 
 
 @cache

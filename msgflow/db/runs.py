@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _T = TypeVar("_T")
 _KEY = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,63}")
 _LONGEST_VALUE = 1_000
+_NO_TEXT = re.compile(r"[\0\ud800-\udfff]")
 
 
 def change_runs(
@@ -104,15 +105,8 @@ def require_label(key: str, value: str | None) -> None:
             f"no key of a label — {key!r}",
             "a letter, then letters, digits, _, - and . (64 at most), such as robot=r2d2",
         )
-    if value is not None and (len(value) > _LONGEST_VALUE or not _is_text(value)):
+    # What the command line could not decode is no text.
+    if value is not None and (len(value) > _LONGEST_VALUE or _NO_TEXT.search(value)):
         raise UsageError(
             f"no value of a label — {key}", f"give text of at most {_LONGEST_VALUE} characters"
         )
-
-
-def _is_text(value: str) -> bool:
-    try:
-        value.encode()
-    except UnicodeEncodeError:
-        return False
-    return "\0" not in value

@@ -88,7 +88,7 @@ def shut_in(
 
 def spill_directory(database: Path) -> Path:
     """Return the directory that connections of this process to `database` spill to."""
-    return _place(database) / f"{_prefix(database)}{mark()}{_SPILL}"
+    return _place(database) / f".{database.name}.{mark()}{_SPILL}"
 
 
 def remove_abandoned_spills(database: Path, *, is_ours_alone: bool) -> None:
@@ -97,18 +97,14 @@ def remove_abandoned_spills(database: Path, *, is_ours_alone: bool) -> None:
     `is_ours_alone` says that the database is open for writing. No other process can have it open
     then, so that every other spill directory is abandoned.
     """
-    others = left_behind(_place(database), _prefix(database), _SPILL, by_others=is_ours_alone)
-    for directory in others:
+    prefix = f".{database.name}."
+    for directory in left_behind(_place(database), prefix, _SPILL, by_others=is_ours_alone):
         shutil.rmtree(directory, ignore_errors=True)
 
 
 def _place(database: Path) -> Path:
     parent = database.absolute().parent
     return parent if os.access(parent, os.W_OK) else Path(tempfile.gettempdir())
-
-
-def _prefix(database: Path) -> str:
-    return f".{database.name}."
 
 
 def require_file(path: Path) -> None:

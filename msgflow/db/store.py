@@ -25,18 +25,23 @@ def store(con: duckdb.DuckDBPyConnection, run_id: int) -> None:
     skipped, since a statement takes longer than its few rows. DuckDB sees staging as of the start
     of the transaction: staging has to be filled before, and a transaction stores one run.
     """
-    staged = {
-        name
-        for (name,) in con.execute(
-            "SELECT table_name FROM duckdb_tables() "
-            "WHERE database_name = 'staging' AND schema_name = 'main' AND estimated_size > 0 "
-            "UNION ALL SELECT view_name FROM duckdb_views() "
-            "WHERE database_name = 'staging' AND schema_name = 'main'"
-        ).fetchall()
-    }
-    bases = _bases(con)
+    rows = con.execute(
+        "SELECT if(schema_name = 'store', 'store', database_name) || '.' || table_name "
+        "FROM duckdb_tables() WHERE estimated_size > 0 "
+        "UNION ALL SELECT 'staging.' || view_name FROM duckdb_views() "
+        "WHERE database_name = 'staging' AND schema_name = 'main'"
+    ).fetchall()
+    filled = {name for (name,) in rows}
+    bases = {}
     for table in store_tables().values():
-        if table.name in staged:
+        if table.key in table.columns:
+            bases[table.name] = 0
+            if f"store.{table.name}" in filled:
+                highest = f"SELECT max({table.key}) FROM store.{table.name}"
+                ((most,),) = con.execute(highest).fetchall()
+                bases[table.name] = int(most or 0)
+    for table in store_tables().values():
+        if f"staging.{table.name}" in filled:
             _copy(con, table, run_id, bases)
 
 
@@ -63,25 +68,6 @@ def empty(con: duckdb.DuckDBPyConnection, *databases: str) -> None:
     for database, schema, sql in filled:
         definition = sql.removeprefix("CREATE TABLE ").removeprefix(f"{schema}.")
         con.execute(f"CREATE OR REPLACE TABLE {database}.{schema}.{definition}")
-
-
-def _bases(con: duckdb.DuckDBPyConnection) -> dict[str, int]:
-    filled = {
-        name
-        for (name,) in con.execute(
-            "SELECT table_name FROM duckdb_tables() "
-            "WHERE schema_name = 'store' AND estimated_size > 0"
-        ).fetchall()
-    }
-    bases = {}
-    for table in store_tables().values():
-        if table.key in table.columns:
-            bases[table.name] = 0
-            if table.name in filled:
-                highest = f"SELECT max({table.key}) FROM store.{table.name}"
-                ((most,),) = con.execute(highest).fetchall()
-                bases[table.name] = int(most or 0)
-    return bases
 
 
 def _copy(

@@ -153,14 +153,9 @@ def _joins(table: StoreTable, way: str) -> Iterator[tuple[str, str, str, str]]:
         alias = way.removesuffix("_id") if at == "self" else f"{at}_{target.name}"
         condition = f"{at}.{column.name} = {alias}.{target.key}"
         yield kind, f"store.{target.name}", alias, condition
-        at, column = alias, _way_on(target)
-
-
-def _way_on(table: StoreTable) -> StoreColumn:
-    """Return the column of a table that leads to a clock: of several the shortest way."""
-    return next(
-        table.columns[key] for key in ("clock_id", "host_id", "process_id") if key in table.columns
-    )
+        # Of several columns that lead to a clock, that of the shortest way.
+        ways_on = ("clock_id", "host_id", "process_id")
+        at, column = alias, next(target.columns[on] for on in ways_on if on in target.columns)
 
 
 def _clock_alias(way: str) -> str:

@@ -79,24 +79,19 @@ def _locked(path: Path, *, wait: bool) -> Iterator[None]:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-            if _is_still(path, descriptor):
+            if os.path.samestat(os.stat(path), os.fstat(descriptor)):
                 break
+            os.close(descriptor)
+        except FileNotFoundError:  # its last holder has removed it meanwhile
+            os.close(descriptor)
         except BaseException:
             os.close(descriptor)
             raise
-        os.close(descriptor)  # its last holder has removed it meanwhile
     try:
         yield
     finally:
         path.unlink(missing_ok=True)
         os.close(descriptor)
-
-
-def _is_still(path: Path, descriptor: int) -> bool:
-    try:
-        return os.path.samestat(os.stat(path), os.fstat(descriptor))
-    except FileNotFoundError:
-        return False
 
 
 def lock_holder(path: Path) -> str:

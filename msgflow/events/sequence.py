@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
 import duckdb
@@ -10,6 +11,7 @@ import pyarrow as pa
 
 from msgflow.sql.json_fields import MOST_LAMBDAS, column_name, json_fields, label_of, member
 from msgflow.sql.quoting import literal
+from msgflow.sql.statement import registered
 from msgflow.trace.columns import BASE, COMMON_SCHEMA
 
 if TYPE_CHECKING:
@@ -39,7 +41,7 @@ _UNPRINTABLE = r"[\p{C}\p{Zl}\p{Zp}]"
 _REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 
 
-class Sequencer:
+class Sequencer(AbstractContextManager["Sequencer"]):
     """Renders rounds of events; a context manager."""
 
     def __init__(self, traces: Sequence[TraceInfo], rendering: Rendering) -> None:
@@ -59,29 +61,22 @@ class Sequencer:
         )
         self._connection.register("host", hosts)
 
-    def __enter__(self) -> Sequencer:
-        return self
-
     def __exit__(self, *exception: object) -> None:
         self._connection.close()
 
     def rows(self, events: Sequence[EventBatch]) -> pa.Table:
         """Return one row per event, in order of `event_id`."""
-        names = [f"batch_{position}" for position in range(len(events))]
-        parts = []
-        for name, item in zip(names, events, strict=True):
+        batches, parts = {}, []
+        for position, item in enumerate(events):
             payload = pa.schema(list(item.batch.schema)[len(COMMON_SCHEMA) :])
             columns = [*COMMON_SCHEMA.names, *map(column_name, range(len(payload)))]
-            self._connection.register(name, item.batch.rename_columns(columns))
-            parts.append(self._select(name, item.name, payload))
-        try:
+            batches[f"batch_{position}"] = item.batch.rename_columns(columns)
+            parts.append(self._select(f"batch_{position}", item.name, payload))
+        with registered(self._connection, **batches):
             return self._connection.sql(
                 f"SELECT * EXCLUDE (event_order) FROM ({' UNION ALL '.join(parts)}) "
                 "ORDER BY event_order"
             ).to_arrow_table()
-        finally:
-            for name in names:
-                self._connection.unregister(name)
 
     def _select(self, batch: str, name: str, payload: pa.Schema) -> str:
         return f"""

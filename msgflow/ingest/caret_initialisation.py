@@ -33,26 +33,24 @@ def restore(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
 
     It tells whether there were any.
     """
-    known, moved = load().tracepoints, _initialisations(_UNDER_ITS_NAME)
-    reported = [
-        (again, known[_FIRST + again.event])
-        for again in _initialisations(_AGAIN)
-        if _FIRST + again.event in known
-    ]
-    tables = [f"raw.{each.table}" for each in (*(again for again, _ in reported), *moved)]
-    if all(table in empty for table in tables):
+    known = load().tracepoints
+    again = [each for each in _initialisations(_AGAIN) if _FIRST + each.event in known]
+    pairs = [(each, known[_FIRST + each.event]) for each in again]
+    pairs += [(each, each) for each in _initialisations(_UNDER_ITS_NAME)]
+    if all(f"raw.{each.table}" in empty for each, _ in pairs):
         return False
+    events = " UNION ALL ".join(
+        f"SELECT event_id, init_timestamp FROM raw.{each.table}"
+        + (" WHERE init_timestamp IS NOT NULL" if each is first else "")
+        for each, first in pairs
+    )
     con.execute(
         "CREATE TEMP TABLE reported AS SELECT event_id, "
         f"{_BEFORE} + row_number() OVER (ORDER BY init_timestamp NULLS FIRST, event_id) AS place "
-        "FROM ("
-        + " UNION ALL ".join(f"SELECT event_id, init_timestamp FROM {table}" for table in tables)
-        + ")"
+        f"FROM ({events})"
     )
-    for again, first in reported:
-        con.execute(_insert(again, first))
-    for tracepoint in moved:
-        con.execute(_move(tracepoint))
+    for each, first in pairs:
+        con.execute(_moved(each, first))
     con.execute("DROP TABLE reported")
     return True
 
@@ -68,28 +66,8 @@ def _initialisations(prefix: str) -> list[Tracepoint]:
     ]
 
 
-def _move(tracepoint: Tracepoint) -> str:
-    payload = ", ".join(f'e."{field.name}"' for field in tracepoint.fields)
-    return f"""
-DELETE FROM raw.{tracepoint.table}
-WHERE event_id IN (
-    SELECT e.event_id
-    FROM raw.{tracepoint.table} AS e
-    JOIN raw.thread AS p ON e.thread_index = p.thread_index
-    WHERE e.init_timestamp IS NOT NULL
-    QUALIFY row_number() OVER (
-        PARTITION BY p.trace_index, p.pid_ns, p.vpid, {payload}
-        ORDER BY e.event_id
-    ) > 1
-);
-UPDATE raw.{tracepoint.table} AS e
-SET event_id = r.place
-FROM reported AS r
-WHERE e.event_id = r.event_id AND e.init_timestamp IS NOT NULL
-"""
-
-
-def _insert(again: Tracepoint, first: Tracepoint) -> str:
+def _moved(again: Tracepoint, first: Tracepoint) -> str:
+    """Return the SQL that puts events into the table of the first ones, each once in a process."""
     known = {field.name for field in first.fields}
     payload = [field.name for field in again.fields if field.name in known]
     columns = ", ".join(f'"{name}"' for name in ("event_id", *_LEADING, *payload))
@@ -114,7 +92,9 @@ ANTI JOIN (
     SELECT e.*, {process}
     FROM raw.{first.table} AS e
     JOIN raw.thread AS p ON e.thread_index = p.thread_index
+    ANTI JOIN reported AS r ON e.event_id = r.event_id
 ) AS o
     ON a.host = o.host AND a.pid_ns IS NOT DISTINCT FROM o.pid_ns AND a.vpid = o.vpid
-    AND o.ts_ns <= a.ts_ns AND {same}
+    AND o.ts_ns <= a.ts_ns AND {same};
+DELETE FROM raw.{first.table} WHERE event_id IN (SELECT event_id FROM reported)
 """

@@ -6,15 +6,13 @@ The data is in `tracepoints.toml`; this gives it Arrow and SQL form.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Literal
 
-if TYPE_CHECKING:
-    import pyarrow as pa
+import pyarrow as pa
 
 COMMON_COLUMNS = (
     ("event_id", "BIGINT"),
@@ -36,24 +34,13 @@ class Field:
 
     name: str  # the column, and the name in most traces
     type: str  # DuckDB's type of the column
-    aliases: tuple[str, ...] = ()  # other names in traces
+    aliases: Sequence[str] = ()  # other names in traces
 
 
-class Origin(Enum):
-    """A property of a preceding event; its value is the suffix of the column that holds it."""
-
-    EVENT_ID = "event_id"
-    TS_NS = "ts_ns"
-    LABEL = "label"
-
-
-class CpuRole(Enum):
-    """What an event of the kernel's scheduler says of the CPU on which it happens."""
-
-    SWITCH = "switch"
-    WAKING = "waking"
-    BEGIN = "begin"
-    END = "end"
+# A property of a preceding event, and the suffix of the column that holds it.
+Origin = Literal["event_id", "ts_ns", "label"]
+# What an event of the kernel's scheduler says of the CPU on which it happens.
+CpuRole = Literal["switch", "waking", "begin", "end"]
 
 
 @dataclass(frozen=True)
@@ -66,7 +53,7 @@ class Predecessor:
     @property
     def column(self) -> str:
         """Name of the column, which is NULL where there is no such event."""
-        return f"previous_{self.sequence}_{self.origin.value}"
+        return f"previous_{self.sequence}_{self.origin}"
 
 
 @dataclass(frozen=True)
@@ -74,10 +61,10 @@ class Tracepoint:
     """An event."""
 
     name: str  # provider and event, such as 'ros2:rcl_publish'
-    fields: tuple[Field, ...]  # its payload, over all versions
-    aliases: tuple[str, ...] = ()  # other names that it has in traces
-    sequences: tuple[str, ...] = ()  # sequences of its thread that the event belongs to
-    predecessors: tuple[Predecessor, ...] = ()  # columns about the events before it
+    fields: Sequence[Field]  # its payload, over all versions
+    aliases: Sequence[str] = ()  # other names that it has in traces
+    sequences: Sequence[str] = ()  # sequences of its thread that the event belongs to
+    predecessors: Sequence[Predecessor] = ()  # columns about the events before it
     # The name that columns of its successors show, None if no column shows it.
     label: str | None = None
     # The kernel emits it: it has no provider, and nothing to do with the thread that it
@@ -110,17 +97,13 @@ class Tracepoint:
 
     def arrow_schema(self) -> pa.Schema:
         """Return the payload columns as `TraceSet.batches` wants them."""
-        import pyarrow as pa
-
         return pa.schema(
-            [
-                pa.field(
-                    field.name,
-                    _arrow_type(field.type),
-                    metadata={"aliases": ",".join(field.aliases)} if field.aliases else None,
-                )
-                for field in self.fields
-            ]
+            pa.field(
+                field.name,
+                _arrow_type(field.type),
+                metadata={"aliases": ",".join(field.aliases)} if field.aliases else None,
+            )
+            for field in self.fields
         )
 
     def create_table_sql(self, catalog: str, known: Catalogue) -> str:
@@ -128,17 +111,14 @@ class Tracepoint:
         # Since when the thread had the CPU that leaves it (NULL: not known), and the number of the
         # switch there; the latest switch, and the interrupt that is handled.
         of_cpu = {
-            CpuRole.SWITCH: (("run_start_ns", "BIGINT"), ("switch_number", "BIGINT")),
-            CpuRole.WAKING: (
-                ("switch_event_id", "BIGINT"),
-                ("interrupt", enum_type(known.interrupts)),
-            ),
+            "switch": (("run_start_ns", "BIGINT"), ("switch_number", "BIGINT")),
+            "waking": (("switch_event_id", "BIGINT"), ("interrupt", enum_type(known.interrupts))),
         }
-        label = {Origin.LABEL: enum_type(known.labels)}
+        label = {"label": enum_type(known.labels)}
         columns = (
             *self.common_columns,
             *((before.column, label.get(before.origin, "BIGINT")) for before in self.predecessors),
-            *(of_cpu.get(self.role, ()) if self.role else ()),
+            *of_cpu.get(self.role or "", ()),
             *((field.name, field.type) for field in self.fields),
         )
         body = ",\n".join(f'    "{column}" {sql_type}' for column, sql_type in columns)
@@ -148,7 +128,7 @@ class Tracepoint:
 USER_EVENT = Tracepoint(
     name="user_event",
     fields=(Field("name", "VARCHAR"), Field("fields", "VARCHAR")),
-    predecessors=(Predecessor("call", Origin.EVENT_ID),),
+    predecessors=(Predecessor("call", "event_id"),),
 )
 """What is staged of events that the user asks for, whatever they are called: their name, and their
 fields as JSON. Behind a gap they tell, as calls do, that the thread went on."""
@@ -169,8 +149,7 @@ class Catalogue:
     @property
     def interrupts(self) -> tuple[str, ...]:
         """Kinds of interrupts, in alphabetical order."""
-        kinds = {t.interrupt for t in self.tracepoints.values() if t.interrupt is not None}
-        return tuple(sorted(kinds))
+        return tuple(sorted({t.interrupt for t in self.tracepoints.values() if t.interrupt}))
 
     @cached_property
     def in_traces(self) -> Mapping[str, Tracepoint]:
@@ -213,16 +192,11 @@ def load() -> Catalogue:
 
 
 def _tracepoint(entry: dict[str, Any]) -> Tracepoint:
-    fields = tuple(
-        Field(**{**_without_words(field), "aliases": tuple(field.get("aliases", ()))})
-        for field in entry["fields"]
-    )
-    pairs = (text.split(".") for text in entry.get("predecessors", ()))
-    predecessors = tuple(Predecessor(sequence, Origin(origin)) for sequence, origin in pairs)
-    tuples = {name: tuple(entry.get(name, ())) for name in ("aliases", "sequences")}
-    role = CpuRole(entry["role"]) if "role" in entry else None
-    given = {"fields": fields, "predecessors": predecessors, "role": role}
-    return Tracepoint(**{**_without_words(entry), **tuples, **given})
+    given = {
+        "fields": [Field(**_without_words(field)) for field in entry["fields"]],
+        "predecessors": [Predecessor(*text.split(".")) for text in entry.get("predecessors", ())],
+    }
+    return Tracepoint(**{**_without_words(entry), **given})
 
 
 def _without_words(entry: dict[str, Any]) -> dict[str, Any]:
@@ -230,8 +204,6 @@ def _without_words(entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def _arrow_type(sql_type: str) -> pa.DataType:
-    import pyarrow as pa
-
     if sql_type.endswith("[]"):
         return pa.list_(_arrow_type(sql_type.removesuffix("[]")))
     return {

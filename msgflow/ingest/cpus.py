@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.ingest.catalogue import CpuRole
 from msgflow.ingest.groups import NONE, Groups, Latest, Numbers, gathered
 from msgflow.trace.numpy_arrow import texts_to_arrow, to_arrow, to_numpy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from msgflow.ingest.catalogue import Catalogue, Tracepoint
+    from msgflow.ingest.catalogue import Catalogue, CpuRole, Tracepoint
 
 # Table of `raw`: interrupts that were handled while a thread had the CPU.
 INTERRUPT = "interrupt"
@@ -51,7 +50,7 @@ class Cpus:
         events = self._events(batches, groups)
         for latest in (self._switches, *self._handlings):
             latest.grow(self._cpus.count)
-        switch = self._switches.before(groups, _has_role(batches, groups, CpuRole.SWITCH), events)
+        switch = self._switches.before(groups, _has_role(batches, groups, "switch"), events)
         of_kinds = ([one.interrupt == kind for one, _ in batches] for kind in self._kinds)
         handlings = [
             latest.before(groups, _repeated(batches, groups, is_of), events)
@@ -69,21 +68,21 @@ class Cpus:
         for (tracepoint, batch), begin, end in zip(batches, ends[:-1], ends[1:], strict=True):
             at = groups.place[begin:end]
             match tracepoint.role:
-                case CpuRole.SWITCH:
+                case "switch":
                     is_known = switch["tid"][at] == to_numpy(batch["prev_tid"])
                     found = {
                         "run_start_ns": to_arrow(switch["ts_ns"][at], ~is_known),
                         "switch_number": to_arrow(events["number"][at]),
                     }
                     placed.append((tracepoint.table, _staged(tracepoint, batch, found)))
-                case CpuRole.WAKING:
+                case "waking":
                     before = switch["event_id"][at]
                     found = {
                         "switch_event_id": to_arrow(before, before == NONE),
                         "interrupt": self._named(interrupt[at]),
                     }
                     placed.append((tracepoint.table, _staged(tracepoint, batch, found)))
-                case CpuRole.END:
+                case "end":
                     kind = self._kinds.index(tracepoint.interrupt or "")
                     is_whole = is_open[kind][at] & (switch["tid"][at] > 0)
                     start_ns = handlings[kind]["ts_ns"][at]
@@ -94,10 +93,10 @@ class Cpus:
     def _events(
         self, batches: Sequence[tuple[Tracepoint, pa.RecordBatch]], groups: Groups
     ) -> Mapping[str, NDArray[np.int64]]:
-        is_switch = _has_role(batches, groups, CpuRole.SWITCH)
+        is_switch = _has_role(batches, groups, "switch")
         tids = [
             to_numpy(batch["next_tid"])
-            if tracepoint.role is CpuRole.SWITCH
+            if tracepoint.role == "switch"
             else np.zeros(batch.num_rows, np.int32)
             for tracepoint, batch in batches
         ]
@@ -113,7 +112,7 @@ class Cpus:
             "ts_ns": gathered(batches, "ts_ns")[groups.rows],
             "tid": np.concatenate(tids).astype(np.int64)[groups.rows],
             "number": base + count - 1,
-            "is_open": _has_role(batches, groups, CpuRole.BEGIN).astype(np.int64),
+            "is_open": _has_role(batches, groups, "begin").astype(np.int64),
         }
 
     def _named(self, kinds: NDArray[np.int32]) -> pa.Array:
@@ -151,7 +150,7 @@ def _staged(
 def _has_role(
     batches: Sequence[tuple[Tracepoint, pa.RecordBatch]], groups: Groups, role: CpuRole
 ) -> NDArray[np.bool_]:
-    return _repeated(batches, groups, [tracepoint.role is role for tracepoint, _ in batches])
+    return _repeated(batches, groups, [tracepoint.role == role for tracepoint, _ in batches])
 
 
 def _repeated(

@@ -17,7 +17,16 @@ def hostnames_of(
     traces: Sequence[TraceInfo], hosts: Mapping[str, str | Path | Sequence[str | Path]]
 ) -> dict[int, str]:
     """Return the name of each trace for which one is given: that of the deepest path above it."""
-    given = _host_paths(hosts)
+    # By path: the name that belongs to it, and the path as it was given.
+    given: dict[Path, tuple[str, str | Path]] = {}
+    for name, paths in hosts.items():
+        for path in [paths] if isinstance(paths, str | Path) else paths:
+            other, _ = given.setdefault(Path(os.path.realpath(path)), (name, path))
+            if other != name:
+                raise UsageError(
+                    f"two names are given for the host of one path: {other} and {name} — {path}",
+                    "leave out one of the two",
+                )
     names: dict[int, str] = {}
     used: set[Path] = set()
     for trace in traces:
@@ -38,19 +47,3 @@ def hostnames_of(
             "give --host NAME=PATH with a directory that holds traces of this ingest",
         )
     return names
-
-
-def _host_paths(
-    hosts: Mapping[str, str | Path | Sequence[str | Path]],
-) -> dict[Path, tuple[str, str | Path]]:
-    """Return the name that belongs to each path, and the path as it was given."""
-    given: dict[Path, tuple[str, str | Path]] = {}
-    for name, paths in hosts.items():
-        for path in [paths] if isinstance(paths, str | Path) else paths:
-            other, _ = given.setdefault(Path(os.path.realpath(path)), (name, path))
-            if other != name:
-                raise UsageError(
-                    f"two names are given for the host of one path: {other} and {name} — {path}",
-                    "leave out one of the two",
-                )
-    return given

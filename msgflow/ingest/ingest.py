@@ -36,7 +36,6 @@ from msgflow.sql.failure import database_errors, in_words
 from msgflow.sql.interrupt import interruptible, noted_interrupts
 
 if TYPE_CHECKING:
-    from msgflow.clocks.clocks_file import ClockSync
     from msgflow.db.finding import Finding
     from msgflow.links.links_file import LinksFile
     from msgflow.sql.interrupt import Interrupts
@@ -109,9 +108,7 @@ def ingest(
     Everything happens in one transaction; a new database appears only when it is complete. Ctrl-C
     ends the ingest until the run is stored, and is ignored while it is being finished after that.
 
-    `memory_limit` is the most memory that the database takes, such as '4GB'. When None, it is a
-    quarter of that of the machine, at least 500 MB and at most 4 GB. `traces` are what to read, if
-    they were opened before; `paths` only give the run its name then.
+    `traces` are what to read, if they were opened before; `paths` only give the run its name then.
     """
     if "" in paths:
         raise UsageError(
@@ -142,13 +139,14 @@ def ingest(
                 _target(database, directory) as target,
                 contextlib.closing(open_memory()) as con,
             ):
+                is_new = target != database
                 set_memory_limit(con, memory_limit or default_limit(con))
                 limit_threads(con)
                 con.execute("SET temp_directory = ?", [str(directory)])
                 # A checkpoint would write many of the row groups that were just written again.
                 con.execute("SET max_vacuum_tasks = 0")
-                if not target.is_new:
-                    attach(con, target.path)
+                if not is_new:
+                    attach(con, target)
                     if name is not None and not replace:
                         require_free_name(con, name)
                 staging.attach(con, directory)
@@ -162,7 +160,7 @@ def ingest(
                         hostnames=hostnames,
                         ignore=ignore,
                         events=events,
-                        may_hold=not target.is_new,
+                        may_hold=not is_new,
                         replace=replace,
                         interrupts=interrupts,
                         progress=watch.reading,
@@ -176,35 +174,43 @@ def ingest(
                         interrupts=interrupts,
                     )
                 refusals.require_ros_events(traces.traces, traces.event_counts, traces.damages)
-                names = (name, fallback_name(paths))
                 event_count = sum(traces.event_counts.values())
-                run = interruptible(
-                    con,
-                    lambda: _write(
-                        con,
-                        target,
-                        names,
-                        replaced,
-                        (declared, clocks),
-                        keep_staging,
-                        event_count,
-                        watch,
-                        interrupts,
-                    ),
-                )
+
+                def write() -> tuple[int, str, tuple[Finding, ...]]:
+                    watch.enter("building the model")
+                    with staging.writing(con):
+                        model.build(con)
+                    if is_new:
+                        migration.create(target)
+                        attach(con, target, is_new=True)
+                    if keep_staging is not None:
+                        watch.enter("writing the staged events")
+                        staging.export(con, keep_staging)
+                    with transaction(con):
+                        watch.enter("storing the run")
+                        run_id, run_name = store_run(con, name, fallback_name(paths), replaced)
+                        watch.enter("linking messages")
+                        if declared is not None:
+                            declare_links(con, run_id, declared)
+                        derive(con, run_id, synchronise=lambda: set_clocks(con, run_id, clocks))
+                        findings = tuple(read_findings(con, [run_id], info=True))
+                        interrupts.make_final()
+                    return run_id, run_name, findings
+
+                run = interruptible(con, write)
                 watch.enter("closing the database")
                 staging.leave(con)
-                warnings = (*unread, *_finished(con, database, target))
+                warnings = (*unread, *_finished(con, database, is_new=is_new))
         return IngestReport(*run, event_count, watch.finish(), warnings)
 
 
-def _finished(con: duckdb.DuckDBPyConnection, database: Path, target: _Target) -> tuple[str, ...]:
+def _finished(con: duckdb.DuckDBPyConnection, database: Path, *, is_new: bool) -> tuple[str, ...]:
     """Put all that was committed into the file, and return what went wrong there."""
     try:
         con.execute("CHECKPOINT")
     except duckdb.Error as error:
         words = in_words(error, database)
-        if target.is_new or words is None:
+        if is_new or words is None:
             raise
         # The run is in the log, which the next one to open the database reads.
         log = database.with_name(f"{database.name}.wal").name
@@ -215,55 +221,14 @@ def _finished(con: duckdb.DuckDBPyConnection, database: Path, target: _Target) -
     return ()
 
 
-def _write(
-    con: duckdb.DuckDBPyConnection,
-    target: _Target,
-    names: tuple[str | None, str],
-    replaced: frozenset[int],
-    given: tuple[LinksFile | None, ClockSync],
-    keep_staging: Path | None,
-    event_count: int,
-    watch: _Watch,
-    interrupts: Interrupts,
-) -> tuple[int, str, tuple[Finding, ...]]:
-    watch.enter("building the model")
-    with staging.writing(con):
-        is_small = event_count < staging.ROWS_PER_INSERT  # to drop them would free next to nothing
-        model.build(con, keep=is_small or keep_staging is not None)
-    if target.is_new:
-        migration.create(target.path)
-        attach(con, target.path, is_new=True)
-    if keep_staging is not None:
-        watch.enter("writing the staged events")
-        staging.export(con, keep_staging)
-    with transaction(con):
-        watch.enter("storing the run")
-        run_id, run_name = store_run(con, *names, replaced)
-        watch.enter("linking messages")
-        declared, clocks = given
-        if declared is not None:
-            declare_links(con, run_id, declared)
-        derive(con, run_id, synchronise=lambda: set_clocks(con, run_id, clocks))
-        findings = tuple(read_findings(con, [run_id], info=True))
-        interrupts.make_final()
-    return run_id, run_name, findings
-
-
-@dataclass(frozen=True)
-class _Target:
-    """The file to write to: the database, or a new one that takes its place at the end."""
-
-    path: Path
-    is_new: bool
-
-
 @contextlib.contextmanager
-def _target(database: Path, directory: Path) -> Iterator[_Target]:
+def _target(database: Path, directory: Path) -> Iterator[Path]:
+    """Yield the file to write to: the database, or a new one that takes its place at the end."""
     if database.exists():
-        yield _Target(database, is_new=False)
+        yield database
         return
     fresh = directory / "target.duckdb"
-    yield _Target(fresh, is_new=True)
+    yield fresh
     try:
         os.link(fresh, database)
     except FileExistsError:
@@ -282,17 +247,14 @@ class _Watch:
     ) -> None:
         self._report = report
         self._interrupts = interrupts
-        self._seconds: dict[str, float] = {}
-        self._stage: str | None = None
-        self._since = 0.0
+        self._begins: dict[str, float] = {}  # of the stages, in their order
         self._events = 0
         self._rate = 0.0
 
     def enter(self, stage: str) -> None:
         """Begin a stage, unless Ctrl-C came during the one before."""
         self._interrupts.check()
-        self._close()
-        self._stage, self._since = stage, time.monotonic()
+        self._begins[stage] = time.monotonic()
         self._tell(None)
 
     def reading(self, state: Progress, seconds: float) -> None:
@@ -301,14 +263,12 @@ class _Watch:
         self._tell(state.fraction)
 
     def finish(self) -> Mapping[str, float]:
-        self._close()
-        return dict(self._seconds)
-
-    def _close(self) -> None:
-        if self._stage is not None:
-            self._seconds[self._stage] = time.monotonic() - self._since
-            self._stage = None
+        """Return how long each stage took."""
+        stages, begins = list(self._begins), list(self._begins.values())
+        ends = [*begins[1:], time.monotonic()]
+        return {stage: end - begin for stage, begin, end in zip(stages, begins, ends, strict=True)}
 
     def _tell(self, fraction: float | None) -> None:
-        if self._report is not None and self._stage is not None:
-            self._report(IngestProgress(self._stage, self._events, fraction, self._rate))
+        if self._report is not None:
+            stage = next(reversed(self._begins))
+            self._report(IngestProgress(stage, self._events, fraction, self._rate))

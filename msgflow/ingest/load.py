@@ -6,13 +6,14 @@ import contextlib
 import itertools
 import time
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import pyarrow as pa
 
+from msgflow.db.store import empty
 from msgflow.db.transaction import transaction
-from msgflow.ingest import overlapping_traces, staging
+from msgflow.ingest import overlapping_traces
 from msgflow.ingest.catalogue import USER_EVENT, load
 from msgflow.ingest.cpus import Cpus
 from msgflow.ingest.sequences import Sequences
@@ -62,9 +63,11 @@ def load_traces(
     for name in superfluous(traces.traces):
         wanted.pop(name, None)
     wanted |= dict.fromkeys(user_names)
-    sources = _sources(traces.traces, hostnames)
-    for source in sources:
-        con.execute(f"INSERT INTO staging.source VALUES ({', '.join('?' * len(source))})", source)
+    sources = list(_sources(traces.traces, hostnames))
+    # A host is a clock and a name, as in `schema/model/identity/host.sql`.
+    numbers: dict[tuple[object, object], int] = {}
+    hosts = [numbers.setdefault((row[7], row[4]), len(numbers)) for row in sources]
+    _insert(con, "source", sources)
     started = time.monotonic()
 
     def report(state: Progress) -> None:
@@ -77,7 +80,7 @@ def load_traces(
     def read(corrections: Corrections | None) -> Counter[tuple[str, str, str]]:
         batches = traces.batches(wanted, progress=report)
         implausible: Counter[tuple[str, str, str]] = Counter()
-        sequences, cpus = Sequences(catalogue, _hosts(sources)), Cpus(catalogue)
+        sequences, cpus = Sequences(catalogue, hosts), Cpus(catalogue)
         with transaction(con), con.cursor() as beside:
             # A thread reads the next round while DuckDB inserts this one.
             placed = _placed(batches, sequences, cpus, corrections, implausible, beside)
@@ -92,16 +95,11 @@ def load_traces(
     implausible = read(None)
     corrections = overlapping_traces.corrections_of(con)
     if corrections:
-        staging.empty(con)
+        empty(con, "raw")
         implausible = read(corrections)
-    _insert(
-        con,
-        "event_count",
-        (
-            (index, name, name in catalogue.in_traces or name in user_names, count)
-            for (index, name), count in traces.event_counts.items()
-        ),
-    )
+    known = catalogue.in_traces.keys() | user_names
+    counts = ((*of, of[1] in known, count) for of, count in traces.event_counts.items())
+    _insert(con, "event_count", counts)
     declared = ((trace.index, name) for trace in traces.traces for name in trace.event_names)
     _insert(con, "declared", (row for row in declared if row[1] in wanted))
     damages = (
@@ -171,11 +169,12 @@ def _placed(
 def superfluous(traces: Sequence[TraceInfo]) -> frozenset[str]:
     """Return the names of `sched_wakeup`, if a `sched_waking` came before each."""
     wakeup, waking = (
-        {tracepoint.name, *tracepoint.aliases}
-        for tracepoint in map(load().tracepoints.__getitem__, ("sched_wakeup", "sched_waking"))
+        {name, *load().tracepoints[name].aliases} for name in ("sched_wakeup", "sched_waking")
     )
-    declared = [set(trace.event_names) for trace in traces]
-    is_needed = any(names & wakeup and not names & waking for names in declared)
+    is_needed = any(
+        wakeup.intersection(trace.event_names) and waking.isdisjoint(trace.event_names)
+        for trace in traces
+    )
     return frozenset() if is_needed else frozenset(wakeup)
 
 
@@ -186,33 +185,25 @@ def without_thread(tracepoint: Tracepoint, batch: pa.RecordBatch) -> tuple[str, 
     return tracepoint.table, batch.select(columns)
 
 
-def _sources(traces: Sequence[TraceInfo], hostnames: Mapping[int, str]) -> list[list[object]]:
-    rows = []
+def _sources(
+    traces: Sequence[TraceInfo], hostnames: Mapping[int, str]
+) -> Iterator[tuple[object, ...]]:
     for trace in traces:
         hostname = hostnames.get(trace.index) or trace.hostname or "unknown"
-        rows.append(
-            [
-                trace.index,
-                str(trace.path),
-                trace.uuid,
-                trace.domain,
-                hostname,
-                trace.tracer,
-                trace.clock_uuid,
-                trace.clock_uuid or f"host {hostname}",
-                trace.begin_ns,
-                trace.end_ns,
-                trace.clock_correction_ns,
-                trace.clock_offset_ns + trace.clock_correction_ns,
-            ]
+        yield (
+            trace.index,
+            str(trace.path),
+            trace.uuid,
+            trace.domain,
+            hostname,
+            trace.tracer,
+            trace.clock_uuid,
+            trace.clock_uuid or f"host {hostname}",
+            trace.begin_ns,
+            trace.end_ns,
+            trace.clock_correction_ns,
+            trace.clock_offset_ns + trace.clock_correction_ns,
         )
-    return rows
-
-
-def _hosts(sources: Sequence[Sequence[object]]) -> list[int]:
-    """Number the hosts of traces: (clock, hostname), see `schema/model/identity/host.sql`."""
-    numbers: dict[tuple[object, object], int] = {}
-    return [numbers.setdefault((row[7], row[4]), len(numbers)) for row in sources]
 
 
 def plausible(

@@ -7,15 +7,14 @@ has its empty table.
 
 from __future__ import annotations
 
-import functools
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
-from msgflow.db.finding import kinds_of, statement
-from msgflow.db.store_table import store_tables
+from msgflow.db.finding import kinds_with_rows, statement
 from msgflow.files.resources import resource_directory
 from msgflow.ingest import staging
 from msgflow.ingest.caret_initialisation import restore
@@ -32,22 +31,15 @@ _FINDING = "staging.finding"
 _TABLE = re.compile(r"CREATE TABLE ([a-z_.]+) \([^;]*;")
 
 
-def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool = True) -> None:
+def build(con: duckdb.DuckDBPyConnection, *, findings: bool = True) -> None:
     """Create every object of these folders, each from those before it."""
-    headers = objects.model()
-    if not findings:
-        headers = tuple(header for header in headers if header.name != _FINDING)
     empty = staging.empty_tables(con)
     if any([restore(con, empty), translate(con, empty)]):
         empty = staging.empty_tables(con)
     staging.narrow(con, empty)
-    last_uses = {} if keep else _last_uses(headers)
-    for position, header in enumerate(headers):
-        create(con, header, empty)
-        for name, last_use in last_uses.items():
-            # A table without rows is no burden.
-            if last_use == position and name not in empty:
-                con.execute(f"DROP TABLE {name}")
+    for header in objects.model():
+        if findings or header.name != _FINDING:
+            create(con, header, empty)
 
 
 def translate(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
@@ -65,11 +57,7 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
     `empty` names the tables that exist and have no row. This function keeps it up to date.
     """
     if header.name == _FINDING:
-        kinds = kinds_of("input")
-        sources = {source for kind in kinds for source in kind.sources if source[0] not in empty}
-        rows = {source: f"{source[0]} WHERE {source[1] or 'true'}" for source in sources}
-        filled = with_rows(con, rows, {})
-        found = [kind for kind in kinds if not kind.sources or filled.intersection(kind.sources)]
+        found = kinds_with_rows(con, "input", {}, empty=empty)
         header = replace(header, body=statement(found))
     if header.kind == "macro":
         con.execute(header.body)
@@ -91,59 +79,13 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
 def may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> bool:
     """Tell whether an object may have a row, by what `when` of its header says."""
     return not header.sources or any(
-        name not in empty
-        and (
-            not condition
-            or con.execute(f"SELECT 1 FROM {name} WHERE {condition} LIMIT 1").fetchall()
-        )
+        name not in empty and (not condition or with_rows(con, [(name, condition)], {}))
         for name, condition in header.sources
     )
 
 
-@functools.cache
+@cache
 def _empty_tables() -> Mapping[str, str]:
     """Return the statement that makes each table of the model without a row."""
     text = (resource_directory("schema") / "model.sql").read_text(encoding="utf-8")
     return {match[1]: match[0] for match in _TABLE.finditer(text)}
-
-
-def _last_uses(headers: tuple[Header, ...]) -> dict[str, int]:
-    """Return the position of the last object that needs a table: of each, built or read.
-
-    Tables that `store` copies, and what they need at that moment, are not in it.
-    """
-    stored = {f"staging.{name}" for name in store_tables()}
-    unfolded = {header.name: header for header in headers if header.kind != "view"}
-    last = dict.fromkeys(_raw_tables(), 0)
-    for position, header in enumerate(headers):
-        if header.kind == "view":
-            last[header.name] = position
-            needs = set(_needs(header))
-            _unfold(needs, unfolded)
-            last |= dict.fromkeys(needs & last.keys(), position)
-    kept = set(stored)
-    _unfold(kept, unfolded)
-    return {name: position for name, position in last.items() if name not in kept}
-
-
-def _unfold(names: set[str], unfolded: Mapping[str, Header]) -> None:
-    """Add what the objects among `names` that are not tables need themselves."""
-    waiting = [name for name in names if name in unfolded]
-    while waiting:
-        needs = _needs(unfolded[waiting.pop()]) - names
-        names |= needs
-        waiting += [name for name in needs if name in unfolded]
-
-
-@functools.cache
-def _needs(header: Header) -> frozenset[str]:
-    """Return what an object needs, with the tables of `raw` one by one."""
-    if staging.OF_ALL_EVENTS & set(header.needs):
-        return frozenset(header.needs) | _raw_tables()
-    words = re.findall(r"\w+", header.body)
-    return frozenset(header.needs) | {f"raw.{word}" for word in words} & _raw_tables()
-
-
-@functools.cache
-def _raw_tables() -> frozenset[str]:
-    return frozenset(f"raw.{table}" for table in staging.event_tables())

@@ -9,9 +9,7 @@ it.
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -35,6 +33,13 @@ _SLACK_NS = 100_000
 _TWIN_NS = 10_000
 
 _PARAMETERS = {"slack_ns": _SLACK_NS, "twin_ns": _TWIN_NS}
+# The statements of `schema/overlap` that become tables, each after those that it reads: of the
+# sessions, and of what they recorded at the same time.
+_OF_SESSIONS = ("session_trace", "process_namespace", "coverage", "overlap_window")
+_IN_COMMON = (
+    "session_pair", "session_container", "duplicate_event", "duplicate_count",
+    "alternating_name", "given_namespace",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -81,63 +86,30 @@ class Corrections:
 
 def corrections_of(con: duckdb.DuckDBPyConnection) -> Corrections:
     """Return how the events in `raw` have to be corrected, and fill `staging.left_out`."""
-    with contextlib.ExitStack() as made:
-        for table in ("session_trace", "process_namespace", "coverage", "overlap_window"):
-            _make(con, made, table)
-        duplicates = np.empty(0, np.int64)
-        if con.execute("SELECT 1 FROM overlap_window LIMIT 1").fetchall():
-            _create(con, made, f"VIEW thread_event AS {_events()}")
-            _create(con, made, f"VIEW session_event AS {statements().header('session_event').body}")
-            for table in ("session_pair", "session_container", "duplicate_event"):
-                _make(con, made, table)
-            counts = statements().header("duplicate_count").body
-            con.execute(f"INSERT INTO staging.left_out\n{counts}")
-            found = con.execute("SELECT event_id FROM duplicate_event ORDER BY ALL").fetchnumpy()
-            duplicates = np.asarray(found["event_id"], np.int64)
-        else:
-            _create(con, made, "TABLE session_container (session BIGINT, container BIGINT)")
-        # A thread that gets its name back has had three.
-        if con.execute(
-            "SELECT 1 FROM raw.thread_name GROUP BY thread_index HAVING count(*) > 2 LIMIT 1"
-        ).fetchall():
-            _make(con, made, "alternating_name")
-        else:
-            columns = "(host BIGINT, vpid INTEGER, procname VARCHAR)"
-            _create(con, made, f"TABLE alternating_name {columns}")
-        traces = con.execute("SELECT session FROM session_trace ORDER BY trace_index").fetchnumpy()
-        sessions = np.asarray(traces["session"], np.int64)
-        if not any(
-            con.execute(f"SELECT 1 FROM {table} LIMIT 1").fetchall()
-            for table in ("alternating_name", "process_namespace", "session_container")
-        ):
-            none = np.empty(0, np.int64)
-            return Corrections(duplicates, none, none, sessions, {})
-        known = con.execute(statements().header("given_namespace").body).fetchnumpy()
-    names = {name: n for n, name in enumerate(dict.fromkeys(known["procname"].tolist()))}
-    numbers = np.array([names[name] for name in known["procname"].tolist()], np.int64)
+    for table in _OF_SESSIONS:
+        statements().keep(con, table, _PARAMETERS)
+    if con.execute("FROM overlap_window LIMIT 1").fetchall():
+        con.execute(f"CREATE OR REPLACE TEMP VIEW thread_event AS {_events()}")
+    for table in _IN_COMMON:
+        statements().keep(con, table, _PARAMETERS)
+    con.execute("INSERT INTO staging.left_out BY NAME FROM duplicate_count")
+    duplicates = con.execute("SELECT event_id FROM duplicate_event ORDER BY ALL").fetchnumpy()
+    traces = con.execute("SELECT session FROM session_trace ORDER BY trace_index").fetchnumpy()
+    known = con.execute("FROM given_namespace").fetchnumpy()
+    for table in (*_OF_SESSIONS, *_IN_COMMON):
+        con.execute(f"DROP TABLE temp.{table}")
+    given = known["procname"].tolist()
+    names = {name: number for number, name in enumerate(dict.fromkeys(given))}
+    numbers = np.array([names[name] for name in given], np.int64)
     processes = _process(known["session"], known["vpid"], numbers, len(names))
     order = np.argsort(processes)
     return Corrections(
-        duplicates, processes[order], np.asarray(known["pid_ns"], np.int64)[order], sessions, names
+        np.asarray(duplicates["event_id"], np.int64),
+        processes[order],
+        np.asarray(known["namespace"], np.int64)[order],
+        np.asarray(traces["session"], np.int64),
+        names,
     )
-
-
-def _make(con: duckdb.DuckDBPyConnection, made: ExitStack, table: str) -> None:
-    header = statements().header(table)
-    values = {param.name: _PARAMETERS[param.name] for param in header.params}
-    _create(con, made, f"TABLE {table} AS\n{header.body}", values)
-
-
-def _create(
-    con: duckdb.DuckDBPyConnection,
-    made: ExitStack,
-    definition: str,
-    values: Mapping[str, int] | None = None,
-) -> None:
-    """Create a temporary table or view, which `made` drops."""
-    con.execute(f"CREATE OR REPLACE TEMP {definition}", values)
-    kind, name, _ = definition.split(maxsplit=2)
-    made.callback(con.execute, f"DROP {kind} temp.{name}")
 
 
 @cache

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.ingest.catalogue import Origin
 from msgflow.ingest.groups import NONE, Groups, Latest, Numbers, gathered, present
 from msgflow.trace.columns import COMMON_SCHEMA
 from msgflow.trace.numpy_arrow import is_valid, texts_to_arrow, to_arrow, to_numpy
@@ -50,7 +49,7 @@ class Sequences:
             for before in tracepoint.predecessors
         }
         self._latest = {
-            name: Latest([origin for origin in Origin if (name, origin) in asked])
+            name: Latest([origin for sequence, origin in asked if sequence == name])
             for name in catalogue.sequences
         }
 
@@ -70,9 +69,9 @@ class Sequences:
         members = np.repeat(np.array(of_batches, np.uint8), sizes)[groups.rows]
         labels = [self._labels.get(each.label or "", NONE) for each, _ in batches]
         events = {
-            Origin.EVENT_ID: ids[groups.rows],
-            Origin.TS_NS: gathered(batches, "ts_ns")[groups.rows],
-            Origin.LABEL: np.repeat(np.array(labels, np.int8), sizes)[groups.rows],
+            "event_id": ids[groups.rows],
+            "ts_ns": gathered(batches, "ts_ns")[groups.rows],
+            "label": np.repeat(np.array(labels, np.int8), sizes)[groups.rows],
         }
         origins = {}
         for sequence, latest in self._latest.items():
@@ -85,7 +84,7 @@ class Sequences:
             for before in tracepoint.predecessors:
                 values = origins[before.sequence][before.origin][groups.place[begin:end]]
                 column = to_arrow(values, values == NONE)
-                if before.origin is Origin.LABEL:
+                if before.origin == "label":
                     column = pa.DictionaryArray.from_arrays(column, self._label_texts)
                 columns[before.column] = column
             for field in batch.schema.names[_CONTEXTS:]:
@@ -150,7 +149,7 @@ def _new_threads(
 def _names(
     batches: Sequence[tuple[Tracepoint, pa.RecordBatch]],
     groups: Groups,
-    events: Mapping[Origin, NDArray[Any]],
+    events: Mapping[str, NDArray[Any]],
 ) -> Rows:
     """Return the stretches of events of a thread under one name; several may follow each other."""
     encoded = pa.chunked_array([batch["procname"] for _, batch in batches]).unify_dictionaries()
@@ -168,10 +167,10 @@ def _names(
     columns = {
         "thread_index": to_arrow(groups.groups[starts]),
         "procname": pa.DictionaryArray.from_arrays(names, encoded.chunks[0].dictionary),
-        "first_event_id": to_arrow(events[Origin.EVENT_ID][starts]),
-        "last_event_id": to_arrow(events[Origin.EVENT_ID][ends]),
-        "first_seen_ns": to_arrow(events[Origin.TS_NS][starts]),
-        "last_seen_ns": to_arrow(events[Origin.TS_NS][ends]),
+        "first_event_id": to_arrow(events["event_id"][starts]),
+        "last_event_id": to_arrow(events["event_id"][ends]),
+        "first_seen_ns": to_arrow(events["ts_ns"][starts]),
+        "last_seen_ns": to_arrow(events["ts_ns"][ends]),
     }
     return "thread_name", pa.RecordBatch.from_pydict(columns)
 
@@ -179,7 +178,7 @@ def _names(
 def _cpu_returns(
     batches: Sequence[tuple[Tracepoint, pa.RecordBatch]],
     groups: Groups,
-    events: Mapping[Origin, NDArray[Any]],
+    events: Mapping[str, NDArray[Any]],
 ) -> Iterator[Rows]:
     """Yield the events of a thread that changed its CPU twice faster than a thread can."""
     cpus = gathered(batches, "cpu_id")[groups.rows]
@@ -187,7 +186,7 @@ def _cpu_returns(
     is_change[groups.starts] = False
     changes = np.flatnonzero(is_change)
     first, second = changes[:-1], changes[1:]
-    times = events[Origin.TS_NS]
+    times = events["ts_ns"]
     is_fast = (groups.groups[first] == groups.groups[second]) & (
         times[second] - times[first - 1] < _SHORTEST_RETURN_NS
     )
@@ -195,6 +194,6 @@ def _cpu_returns(
     if found.size:
         columns = {
             "thread_index": to_arrow(groups.groups[found]),
-            "event_id": to_arrow(events[Origin.EVENT_ID][found]),
+            "event_id": to_arrow(events["event_id"][found]),
         }
         yield "cpu_return", pa.RecordBatch.from_pydict(columns)

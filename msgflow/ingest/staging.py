@@ -18,9 +18,9 @@ from msgflow.db.transaction import transaction
 from msgflow.errors import UsageError
 from msgflow.files.atomic_directory import replacing_entries
 from msgflow.files.resources import resource_directory
-from msgflow.ingest.catalogue import COMMON_COLUMNS, Origin, Predecessor, Tracepoint, load
+from msgflow.ingest.catalogue import COMMON_COLUMNS, Tracepoint, load
 from msgflow.sql.quoting import literal
-from msgflow.sql.statement import internal_sql
+from msgflow.sql.statement import internal_sql, registered
 from msgflow.trace import PACKET
 
 if TYPE_CHECKING:
@@ -34,8 +34,9 @@ ROWS_PER_INSERT = 122_880
 # Rows of all tables that wait for an insert.
 MOST_WAITING = 500_000
 
-OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
-"""Views of all events, which unite the tables of all tracepoints."""
+_COLUMNS = ", ".join(name for name, _ in COMMON_COLUMNS)
+# Views of all events, which unite the tables of all tracepoints.
+_OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
 
 
 def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
@@ -67,20 +68,21 @@ def narrow(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> None:
     """Create the views of all events over the tables that have rows: empty ones cost planning."""
     known = [each for each in load().of_threads if not each.is_translated]
     left = [each for each in known if f"raw.{each.table}" not in empty]
-    con.execute(_event_view(left or known))
-    con.execute(_predecessor_view([each for each in left if _event_predecessors(each)] or known))
+    events = [f"SELECT {_COLUMNS} FROM raw.{each.table}" for each in left or known]
+    pointers = _predecessors(left) or _predecessors(known)
+    for view, selects in (("event", events), ("predecessor", pointers)):
+        rows = "\nUNION ALL\n".join(selects)
+        con.execute(f"CREATE OR REPLACE VIEW staging.{view} AS\n{rows}")
 
 
-def empty(con: duckdb.DuckDBPyConnection) -> None:
-    """Empty `raw`, to read everything again."""
-    others = ("packet", "thread", "thread_name", "cpu_return", "interrupt")
-    for table in (*event_tables(), *others):
-        con.execute(f"TRUNCATE raw.{table}")
-
-
-def event_tables() -> tuple[str, ...]:
-    """Return the tables of `raw` that events are read into, without their schema."""
-    return tuple(tracepoint.table for tracepoint in load().staged.values())
+def _predecessors(tracepoints: Sequence[Tracepoint]) -> list[str]:
+    return [
+        f"SELECT {_COLUMNS}, '{before.sequence}' AS sequence, {before.column} AS previous_event_id "
+        f"FROM raw.{tracepoint.table}"
+        for tracepoint in tracepoints
+        for before in tracepoint.predecessors
+        if before.origin == "event_id"
+    ]
 
 
 @contextlib.contextmanager
@@ -104,29 +106,6 @@ def leave(con: duckdb.DuckDBPyConnection) -> None:
     con.execute("PRAGMA disable_checkpoint_on_shutdown")
 
 
-def _event_view(tracepoints: Sequence[Tracepoint]) -> str:
-    columns = ", ".join(name for name, _ in COMMON_COLUMNS)
-    selects = "\nUNION ALL\n".join(
-        f"SELECT {columns} FROM raw.{tracepoint.table}" for tracepoint in tracepoints
-    )
-    return f"CREATE OR REPLACE VIEW staging.event AS\n{selects}"
-
-
-def _predecessor_view(tracepoints: Sequence[Tracepoint]) -> str:
-    columns = ", ".join(name for name, _ in COMMON_COLUMNS)
-    selects = "\nUNION ALL\n".join(
-        f"SELECT {columns}, '{before.sequence}' AS sequence, {before.column} AS previous_event_id "
-        f"FROM raw.{tracepoint.table}"
-        for tracepoint in tracepoints
-        for before in _event_predecessors(tracepoint)
-    )
-    return f"CREATE OR REPLACE VIEW staging.predecessor AS\n{selects}"
-
-
-def _event_predecessors(tracepoint: Tracepoint) -> list[Predecessor]:
-    return [each for each in tracepoint.predecessors if each.origin is Origin.EVENT_ID]
-
-
 def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
     """Write all staged tables and views with rows to `directory` as Parquet."""
     found = con.execute(
@@ -138,7 +117,7 @@ def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
     files = {
         f"{name}.parquet": name
         for (name,) in found
-        if name not in OF_ALL_EVENTS and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall()
+        if name not in _OF_ALL_EVENTS and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall()
     }
     with replacing_entries(directory, list(files), force=True) as aside:
         for file, name in files.items():
@@ -191,11 +170,8 @@ class RawTables:
             self._uncommitted = 0
 
     def _same_packets(self, rows: pa.RecordBatch) -> set[int]:
-        self._con.register("packet_batch", rows)
-        try:
+        with registered(self._con, packet_batch=rows):
             runs = self._con.execute(internal_sql().text("known_packet")).fetchall()
-        finally:
-            self._con.unregister("packet_batch")
         if runs and not self._may_replace:
             raise UsageError(
                 f"these packets are in the database already — run {runs[0][1]} ({runs[0][0]})",

@@ -10,6 +10,7 @@ import pyarrow as pa
 
 from msgflow.ingest.catalogue import load
 from msgflow.sql.json_fields import column_name, json_fields
+from msgflow.sql.statement import registered
 from msgflow.trace.columns import COMMON_SCHEMA
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from msgflow.trace import TraceInfo
 
 _SCHEMA = pa.schema([*COMMON_SCHEMA, ("name", pa.string()), ("fields", pa.string())])
-_BATCH = "user_event_batch"
 
 
 def is_match(name: str, patterns: Sequence[str]) -> bool:
@@ -59,12 +59,10 @@ def user_rows(con: duckdb.DuckDBPyConnection, name: str, batch: pa.RecordBatch) 
     payload = pa.schema(list(batch.schema)[common:])
     columns = [column_name(position) for position in range(len(payload))]
     if columns:
-        con.register(_BATCH, pa.RecordBatch.from_arrays(batch.columns[common:], names=columns))
-        try:
-            found = con.sql(f"SELECT CAST({json_fields(payload)} AS VARCHAR) FROM {_BATCH}")
+        rows = pa.RecordBatch.from_arrays(batch.columns[common:], names=columns)
+        with registered(con, user_event_batch=rows):
+            found = con.sql(f"SELECT CAST({json_fields(payload)} AS VARCHAR) FROM user_event_batch")
             fields = found.to_arrow_table().column(0).combine_chunks()
-        finally:
-            con.unregister(_BATCH)
     else:
         fields = pa.repeat("{}", batch.num_rows)
     named = pa.repeat(name, batch.num_rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -53,9 +53,13 @@ def apply_links(
         derive(con, run.run_id)
     applied = []
     for run in runs:
-        sources = internal_sql().run(con, "link_source", {"run_id": run.run_id})
-        ((of_file, of_trace),) = sources.fetchall()
-        sentences = tuple(_without_effect(con, run.run_id))
+        of_run = {"run_id": run.run_id}
+        ((of_file, of_trace),) = internal_sql().run(con, "link_source", of_run).fetchall()
+        untaken = internal_sql().run(con, "link_without_effect", of_run).fetchall()
+        sentences = tuple(
+            f"no message took the link from {inputs} to {outputs} ({kind}): {reason}"
+            for kind, inputs, outputs, reason in untaken
+        )
         applied.append(AppliedLinks(run, *counts[run.run_id], of_file, of_trace, sentences))
     return tuple(applied)
 
@@ -107,12 +111,6 @@ def declare_links(
         "SELECT count(*), count(*) - count(annotation_id) FROM declared_link"
     ).fetchall()
     return total, known, topic_count
-
-
-def _without_effect(con: duckdb.DuckDBPyConnection, run_id: int) -> Iterator[str]:
-    found = internal_sql().run(con, "link_without_effect", {"run_id": run_id}).fetchall()
-    for kind, inputs, outputs, reason in found:
-        yield f"no message took the link from {inputs} to {outputs} ({kind}): {reason}"
 
 
 @dataclass(frozen=True)

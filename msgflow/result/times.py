@@ -10,7 +10,7 @@ import pyarrow
 from pyarrow import compute
 
 from msgflow.errors import UsageError
-from msgflow.run.simulated import known_moments
+from msgflow.run.window import known_moments
 
 if TYPE_CHECKING:
     from msgflow.run.choice import Run

@@ -24,13 +24,29 @@ _DAMAGE = re.compile(
 # DuckDB 2.0 sometimes fails when dictionaries of strings pass through several joins. The same
 # statement seldom fails twice (similar: duckdb/duckdb#24807).
 _MISTAKE = re.compile(r"dict-surviving")
-_OF_FILES = (
-    duckdb.IOException,
-    duckdb.FatalException,
-    duckdb.TransactionException,
-    duckdb.OutOfMemoryException,
-)
+_REFUSED_KINDS = (duckdb.IOException, duckdb.TransactionException)
+_OF_FILES = (*_REFUSED_KINDS, duckdb.FatalException, duckdb.OutOfMemoryException)
 _DAMAGED_KINDS = (duckdb.InternalException, duckdb.FatalException, duckdb.SerializationException)
+
+# What each kind of error means, and what to do about it.
+_WORDS = {
+    "full": (
+        "no space left on the disk of the database ({free} free)",
+        "free some, or put the database on another disk with --db; it is as it was before",
+    ),
+    "refused": (
+        "cannot write beside the database",
+        "check the permissions of its directory, or copy the database elsewhere",
+    ),
+    "mistaken": (
+        "DuckDB {version} made a mistake: {cause}",
+        "try again, then with another version of DuckDB; the database is as it was before",
+    ),
+    "damaged": (
+        "the database is damaged: {cause}",
+        "restore the file from a copy, or ingest the traces into a new one",
+    ),
+}
 
 
 def is_of_the_file(error: BaseException) -> bool:
@@ -41,27 +57,11 @@ def is_of_the_file(error: BaseException) -> bool:
 def in_words(error: BaseException, path: Path) -> DatabaseError | None:
     """Return an error of the file at `path` in our words, None if a statement causes it."""
     kind = _kind(error)
-    if kind == "full":
-        return DatabaseError(
-            f"no space left on the disk of the database ({_free(path)} free) — {path}",
-            "free some, or put the database on another disk with --db; it is as it was before",
-        )
-    if kind == "refused":
-        return DatabaseError(
-            f"cannot write beside the database — {path}",
-            "check the permissions of its directory, or copy the database elsewhere",
-        )
-    if kind == "mistaken":
-        return DatabaseError(
-            f"DuckDB {duckdb.__version__} made a mistake: {_cause(error)} — {path}",
-            "try again, then with another version of DuckDB; the database is as it was before",
-        )
-    if kind == "damaged":
-        return DatabaseError(
-            f"the database is damaged: {_cause(error)} — {path}",
-            "restore the file from a copy, or ingest the traces into a new one",
-        )
-    return None
+    if kind is None:
+        return None
+    what, hint = _WORDS[kind]
+    said = what.format(free=_free(path), version=duckdb.__version__, cause=_cause(error))
+    return DatabaseError(f"{said} — {path}", hint)
 
 
 def out_of_memory(
@@ -126,8 +126,8 @@ def first_line(error: Exception) -> str:
 
 
 def _kind(error: BaseException) -> str | None:
+    """Return what kind of error of a file or disk it is; other errors of Python name their file."""
     if isinstance(error, OSError):
-        # Other errors name their file, or concern the traces.
         return "full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else None
     if isinstance(error, UnicodeDecodeError):
         return "damaged"
@@ -136,17 +136,12 @@ def _kind(error: BaseException) -> str | None:
     text = str(error)
     if isinstance(error, _OF_FILES) and _FULL.search(text):
         return "full"
-    if isinstance(error, duckdb.IOException | duckdb.TransactionException) and _REFUSED.search(
-        text
-    ):
+    if isinstance(error, _REFUSED_KINDS) and _REFUSED.search(text):
         return "refused"
     if isinstance(error, _DAMAGED_KINDS):
         return "mistaken" if _MISTAKE.search(text) else "damaged"
-    if (type(error) is duckdb.Error or isinstance(error, duckdb.IOException)) and _DAMAGE.search(
-        text
-    ):
-        return "damaged"
-    return None
+    may_be_damage = type(error) is duckdb.Error or isinstance(error, duckdb.IOException)
+    return "damaged" if may_be_damage and _DAMAGE.search(text) else None
 
 
 def _cause(error: BaseException) -> str:

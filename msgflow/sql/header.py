@@ -77,10 +77,11 @@ What few recordings have may stand behind `WHERE $has_kernel`, or another name o
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
+from typing import TypeVar
 
 from msgflow.files.resources import resource_directory
 from msgflow.sql.value import Value, is_integer, parse_literal
@@ -131,6 +132,7 @@ SCHEMAS = {
 # Fields of a header that have the text that stands there, or the names.
 _TEXTS = ("severity", "cause", "cure", "note", "slowest", "zero")
 _LISTS = ("brief", "answer", "heading", "also", "unites")
+_Item = TypeVar("_Item", "Param", "Column")
 _NOTES = ("clocks", "callbacks", "kernel", "requests", "goals", "samples")
 
 
@@ -279,17 +281,19 @@ def parse(text: str, path: Path) -> Header:
     note = single.get("note")
     if note is not None and note not in _NOTES:
         raise _error(path, 1, f"note {note!r} is not one of {', '.join(_NOTES)}")
-    like = [_like(name, path) for name in _names(single.get("like", ""))]
-    params = tuple(_params(fields, like, path))
-    variants = tuple(_param(field, path) for field in fields if field.key == "variant")
-    columns = tuple(_columns(fields, like, path))
-    shared = {step.table: step for header in reversed(like) for step in header.steps}
-    for table in _names(single.get("steps", "")):
-        if table not in shared:
+    # Of several files that declare a name the first counts.
+    like = [_like(name, path) for name in reversed(_names(single.get("like", "")))]
+    known_params = {param.name: param for header in like for param in header.params}
+    known_columns = {column.name: column for header in like for column in header.columns}
+    known_steps = {step.table: step for header in like for step in header.steps}
+    of_table = path.parent.name == "public"
+    params = _declared("param", fields, partial(_params, known_params), path)
+    variants = _declared("variant", fields, partial(_params, {}), path)
+    columns = _declared("column", fields, partial(_columns, known_columns, of_table), path)
+    for table in reversed(_names(single.get("steps", ""))):
+        if table not in known_steps:
             raise _error(path, 1, f"nothing makes this table — {table}")
-    steps = (*(shared[table] for table in _names(single.get("steps", ""))), *steps)
-    _check_names(params, path)
-    _check_names(columns, path)
+        steps = (known_steps[table], *steps)
     for key in ("brief", "answer", "heading", "slowest", "zero"):
         for name in _names(single.get(key, "")):
             if name not in [column.name for column in columns]:
@@ -381,100 +385,82 @@ def _sources(text: str) -> tuple[tuple[str, str], ...]:
 
 def _like(name: str, path: Path) -> Header:
     room, _, stem = name.rpartition(".")
-    if room == "main":
-        return _declaring(resource_directory("schema") / "public" / f"{stem}.sql")
-    return _declaring((resource_directory(room) if room else path.parent) / f"{stem}.sql")
+    room = "schema/public" if room == "main" else room
+    folder = resource_directory(room) if room else path.parent
+    return _declaring(folder / f"{stem}.sql")
 
 
 _declaring = cache(read)
 
 
-def _params(fields: Sequence[_Field], like: Sequence[Header], path: Path) -> Iterator[Param]:
-    known = {param.name: param for header in reversed(like) for param in header.params}
+def _declared(
+    key: str, fields: Sequence[_Field], read_value: Callable[[str], Iterable[_Item]], path: Path
+) -> tuple[_Item, ...]:
+    """Return what all fields of a key declare."""
+    items: dict[str, _Item] = {}
     for field in fields:
-        if field.key != "param":
-            continue
-        names = _names(field.value)
-        if known.keys() >= set(names):
-            yield from (known[name] for name in names)
-        else:
-            yield _param(field, path)
+        if field.key == key:
+            try:
+                for item in read_value(field.value):
+                    if item.name in items:
+                        raise ValueError(f"{item.name!r} stands twice")
+                    items[item.name] = item
+            except ValueError as error:
+                raise _error(path, field.line, str(error)) from None
+    return tuple(items.values())
 
 
-def _columns(fields: Sequence[_Field], like: Sequence[Header], path: Path) -> Iterator[Column]:
-    known = {column.name: column for header in reversed(like) for column in header.columns}
-    for field in fields:
-        if field.key != "column":
-            continue
-        if _NAMES.fullmatch(field.value):
-            # Of a public view its table may declare them.
-            unknown = [name for name in _names(field.value) if name not in known]
-            if unknown and path.parent.name != "public":
-                raise _error(path, field.line, f"nothing declares this column — {unknown[0]}")
-            yield from (known.get(name, Column(name, "", None, "")) for name in _names(field.value))
-        else:
-            yield _column(field, path)
-
-
-def _param(field: _Field, path: Path) -> Param:
-    match = _PARAM.fullmatch(field.value)
+def _params(known: Mapping[str, Param], text: str) -> list[Param]:
+    names = _names(text)
+    if known.keys() >= set(names):
+        return [known[name] for name in names]
+    match = _PARAM.fullmatch(text)
     if match is None or (match["default"] is not None and len(match["gap"]) < 2):
-        raise _error(
-            path,
-            field.line,
+        raise ValueError(
             "expected '-- param: name TYPE {choice|choice} = default  description' (choices, or"
             " {least..} or {least..most} of an integer, and default may be left out, two spaces end"
-            " the default),"
-            f" not {field.value!r}",
+            f" the default), not {text!r}"
         )
     choices = tuple(part.strip() for part in (match["choices"] or "").split("|") if part.strip())
     minimum: int | None = None
     maximum: int | None = None
     if limits := _RANGE.fullmatch("|".join(choices)):
         if not is_integer(match["type"]):
-            raise _error(path, field.line, f"only an integer has a minimum, not {match['type']}")
+            raise ValueError(f"only an integer has a minimum, not {match['type']}")
         minimum, choices = int(limits[1]), ()
         maximum = int(limits[2]) if limits[2] else None
-    default: Value = None
-    if match["default"] is not None:
-        try:
-            default = parse_literal(match["default"])
-        except ValueError as error:
-            raise _error(path, field.line, str(error)) from None
-        if choices and default is not None and default not in choices:
-            raise _error(path, field.line, f"the default {default!r} is not among the choices")
-        if minimum is not None and isinstance(default, int) and default < minimum:
-            raise _error(path, field.line, f"the default {default!r} is less than {minimum}")
-        if maximum is not None and isinstance(default, int) and default > maximum:
-            raise _error(path, field.line, f"the default {default!r} is more than {maximum}")
-    return Param(
-        name=match["name"],
-        type=match["type"],
-        default=default,
-        has_default=match["default"] is not None,
-        description=" ".join(match["description"].split()),
-        choices=choices,
-        minimum=minimum,
-        maximum=maximum,
-    )
-
-
-def _column(field: _Field, path: Path) -> Column:
-    match = _COLUMN.fullmatch(field.value)
-    if match is None:
-        raise _error(
-            path,
-            field.line,
-            f"expected '-- column: name TYPE [unit]  description', not {field.value!r}",
+    default = None if match["default"] is None else parse_literal(match["default"])
+    if choices and default is not None and default not in choices:
+        raise ValueError(f"the default {default!r} is not among the choices")
+    if minimum is not None and isinstance(default, int) and default < minimum:
+        raise ValueError(f"the default {default!r} is less than {minimum}")
+    if maximum is not None and isinstance(default, int) and default > maximum:
+        raise ValueError(f"the default {default!r} is more than {maximum}")
+    return [
+        Param(
+            name=match["name"],
+            type=match["type"],
+            default=default,
+            has_default=match["default"] is not None,
+            description=" ".join(match["description"].split()),
+            choices=choices,
+            minimum=minimum,
+            maximum=maximum,
         )
-    return Column(match["name"], match["type"], match["unit"], match["description"])
+    ]
 
 
-def _check_names(items: Sequence[Param | Column], path: Path) -> None:
-    names = [item.name for item in items]
-    for name in names:
-        if names.count(name) > 1:
-            raise _error(path, 1, f"{name!r} stands twice")
+def _columns(known: Mapping[str, Column], of_table: bool, text: str) -> list[Column]:
+    if _NAMES.fullmatch(text):
+        unknown = [name for name in _names(text) if name not in known]
+        # Of a public view its table may declare them.
+        if unknown and not of_table:
+            raise ValueError(f"nothing declares this column — {unknown[0]}")
+        return [known.get(name, Column(name, "", None, "")) for name in _names(text)]
+    match = _COLUMN.fullmatch(text)
+    if match is None:
+        raise ValueError(f"expected '-- column: name TYPE [unit]  description', not {text!r}")
+    return [Column(match["name"], match["type"], match["unit"], match["description"])]
 
 
 def _error(path: Path, line: int, message: str) -> HeaderError:

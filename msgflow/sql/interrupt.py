@@ -83,15 +83,8 @@ class Interrupts:
             return is_in_time
 
 
-# Windows has no terminal that goes away.
-_GONE = [signal.SIGHUP] if hasattr(signal, "SIGHUP") else []
-SIGNALS = (signal.SIGINT, signal.SIGTERM, *_GONE)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """The signals that end a command cleanly."""
-
-
-def _may_be_replaced(handler: object) -> bool:
-    # Python's own handler, and that of the command line (msgflow.cli.signals).
-    return handler is signal.default_int_handler or getattr(handler, "raises_interrupts", False)
 
 
 @contextmanager
@@ -112,7 +105,12 @@ def noted_interrupts() -> Iterator[Interrupts]:
             return
     ends = (getattr(handler, "end_process", None) for handler in before.values())
     interrupts = Interrupts(next(filter(None, ends), None))
-    ours = [number for number, handler in before.items() if _may_be_replaced(handler)]
+    # Python's own handler, and that of the command line (msgflow.cli.signals), are replaced.
+    ours = [
+        number
+        for number, handler in before.items()
+        if handler is signal.default_int_handler or getattr(handler, "raises_interrupts", False)
+    ]
     try:
         for number in ours:
             signal.signal(number, interrupts.on_signal)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -128,26 +128,36 @@ def recorded(
 
 def may_have_rows(
     connection: duckdb.DuckDBPyConnection,
-    sources: Iterable[tuple[str, str]],
+    sources: Collection[tuple[str, str]],
     values: Mapping[str, Any],
+    rows_of: Callable[[str], str] = str,
 ) -> bool:
     """Tell whether a source of a header or step has a row. Without sources the answer is yes."""
-    rows = {source: f"{source[0]} WHERE {source[1] or 'true'}" for source in sources}
-    return not rows or bool(with_rows(connection, rows, values))
+    return not sources or bool(with_rows(connection, sources, values, rows_of))
 
 
 def with_rows(
-    connection: duckdb.DuckDBPyConnection, rows: Mapping[Any, str], values: Mapping[str, Any]
-) -> set[Any]:
-    """Return the sources that have a row, of which `rows` says what follows FROM."""
-    parts = (f"(SELECT {place} FROM {each} LIMIT 1)" for place, each in enumerate(rows.values()))
-    text = " UNION ALL ".join(parts) or "SELECT 0 WHERE false"
+    connection: duckdb.DuckDBPyConnection,
+    sources: Collection[tuple[str, str]],
+    values: Mapping[str, Any],
+    rows_of: Callable[[str], str] = str,
+) -> set[tuple[str, str]]:
+    """Return the sources that have a row; `rows_of` says what follows FROM for a name."""
+    text = " UNION ALL ".join(
+        f"(SELECT {place} FROM {rows_of(name)} WHERE {condition or 'true'} LIMIT 1)"
+        for place, (name, condition) in enumerate(sources)
+    )
+    if not text:
+        return set()
     bound = {key: values[key] for key in connection.extract_statements(text)[0].named_parameters}
-    return {list(rows)[place] for (place,) in connection.execute(text, bound).fetchall()}
+    found = {place for (place,) in connection.execute(text, bound).fetchall()}
+    return {source for place, source in enumerate(sources) if place in found}
 
 
 @contextmanager
-def registered(connection: duckdb.DuckDBPyConnection, **tables: pa.Table) -> Iterator[None]:
+def registered(
+    connection: duckdb.DuckDBPyConnection, **tables: pa.Table | pa.RecordBatch
+) -> Iterator[None]:
     """Let statements read tables of this program, by their names, until the block ends."""
     for name, table in tables.items():
         connection.register(name, table)

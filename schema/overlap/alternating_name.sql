@@ -1,10 +1,14 @@
--- kind: inline
 -- description: Names of processes that run at the same time under one id. A thread that has such
 --     a name gets it back after another one. A thread that renames itself does so inside of
 --     callbacks, too: one that begins under a name and ends under another is of one process. A
 --     thread that initialises ROS may be of a further life of the id: names from before do not
 --     count.
 -- grain: one row per host, pid and name
+-- column: host BIGINT  The host
+-- column: vpid INTEGER  The pid
+-- column: procname VARCHAR  The name
+-- when: raw.thread_name WHERE thread_index IN (SELECT thread_index FROM raw.thread_name
+--     GROUP BY thread_index HAVING count(*) > 2)
 WITH named AS (
     SELECT
         s.host, r.vpid, r.thread_index, n.procname, n.first_event_id,

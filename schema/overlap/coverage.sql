@@ -1,4 +1,3 @@
--- kind: inline
 -- description: The time in which a session recorded programs on each CPU.
 -- grain: one row per session and CPU
 SELECT

@@ -1,8 +1,13 @@
--- kind: inline
 -- description: Events to leave out because another session recorded them as well. Of the sessions
 --     that recorded a tracepoint on a thread, the one with most events of the thread counts; the
 --     others keep what lies outside of its time.
 -- grain: one row per event that is left out
+-- column: event_id BIGINT  The event
+-- column: trace_index INTEGER  Trace that it is left out of
+-- column: used_index INTEGER  Trace that has it as well
+-- column: thread INTEGER  Its thread, as in session_event
+-- column: ts_ns BIGINT [epoch ns]  Its time
+-- when: temp.overlap_window
 WITH recorded AS (
     SELECT
         thread, tracepoint, session,

@@ -1,10 +1,14 @@
--- kind: inline
 -- description: PID namespaces for processes whose events have none. If the sessions of a host are
 --     of several containers, each container but the first gets a number. Else, if several processes
 --     ran under one pid at the same time, each of their names gets one. These numbers are negative,
 --     so that they differ from all that were recorded. Else the namespace counts that another
 --     session recorded for the pid.
 -- grain: one row per session, pid and name of a thread
+-- column: session BIGINT  The session
+-- column: vpid INTEGER  The pid
+-- column: procname VARCHAR  Name of the thread
+-- column: namespace BIGINT  Its PID namespace
+-- when: temp.alternating_name, temp.process_namespace, temp.session_container
 WITH named AS (
     SELECT DISTINCT s.host, r.vpid, n.procname
     FROM raw.thread_name AS n
@@ -27,11 +31,11 @@ given AS (
             WHEN a.procname IS NOT NULL
                 THEN -dense_rank() OVER (PARTITION BY n.host ORDER BY a.procname)
             ELSE p.pid_ns
-        END AS pid_ns
+        END AS namespace
     FROM session AS s
     JOIN named AS n ON s.host = n.host
     LEFT JOIN alternating_name AS a
         ON n.host = a.host AND n.vpid = a.vpid AND n.procname = a.procname
     LEFT JOIN process_namespace AS p ON n.host = p.host AND n.vpid = p.vpid
 )
-SELECT session, vpid, procname, pid_ns FROM given WHERE pid_ns IS NOT NULL
+SELECT session, vpid, procname, namespace FROM given WHERE namespace IS NOT NULL

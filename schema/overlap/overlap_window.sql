@@ -1,4 +1,3 @@
--- kind: inline
 -- description: Times in which two sessions recorded the same CPU.
 -- grain: one row per pair of sessions and CPU
 -- param: slack_ns BIGINT  Most time between the two records of one event

@@ -1,4 +1,3 @@
--- kind: inline
 -- description: PID namespaces of processes that some traces of a host have and others lack, where
 --     all traces that have one have the same.
 -- grain: one row per process

@@ -1,8 +1,10 @@
--- kind: inline
 -- description: Containers of a host but the first one. Two sessions of the same threads are of one
 --     container, and so are two that a third one joins. Sessions of other threads under the same
 --     ids are of two containers: the later one is another than the first.
 -- grain: one row per session of such a container, with the first session of the container
+-- column: session BIGINT  The session
+-- column: container BIGINT  First session of its container
+-- when: temp.overlap_window
 WITH RECURSIVE twin AS (
     SELECT left_session AS session, right_session AS other FROM session_pair WHERE is_same
     UNION ALL

@@ -1,9 +1,12 @@
--- kind: inline
 -- description: Pairs of sessions that recorded the same ids of threads at the same time, and
 --     whether these are the same threads: then most events that one of them recorded while both
 --     did have a twin in the other.
 -- grain: one row per pair of sessions, the earlier one first
 -- param: twin_ns BIGINT  Most time between an event and its twin
+-- column: left_session BIGINT  The earlier session
+-- column: right_session BIGINT  The later session
+-- column: is_same BOOLEAN  They recorded the same threads
+-- when: temp.overlap_window
 WITH recorded AS (
     SELECT
         thread, tracepoint, session,

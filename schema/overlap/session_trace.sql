@@ -1,4 +1,3 @@
--- kind: inline
 -- description: Host of each trace, and session on that host. A session is all traces of one uuid.
 -- grain: one row per trace
 SELECT

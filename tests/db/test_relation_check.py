@@ -8,7 +8,7 @@ import duckdb
 import golden
 import pytest
 
-from msgflow.db.relation_check import broken_relations
+from msgflow.db.finding import broken_relations
 
 
 @pytest.mark.parametrize(("takes", "broken"), [("1\n2\n3\n", 1), ("1\n2\n5\n", 2)])

@@ -8,7 +8,7 @@ from typing import Any
 import pyarrow as pa
 import pytest
 
-from msgflow.ingest.catalogue import CpuRole, load
+from msgflow.ingest.catalogue import load
 from msgflow.ingest.cpus import INTERRUPT, Cpus
 from msgflow.trace.columns import COMMON_SCHEMA
 
@@ -51,16 +51,16 @@ def expected(events: list[tuple[str, Row]]) -> dict[int, tuple[Any, ...]]:
         where = row["trace_index"], row["cpu_id"]
         last, of_cpu = switch.get(where), opened.setdefault(where, {})
         role, kind = load().tracepoints[name].role, load().tracepoints[name].interrupt or ""
-        if role is CpuRole.SWITCH:
+        if role == "switch":
             since = last[1] if last and last[2] == row["prev_tid"] else None
             number = last[3] + 1 if last else 0
             found[row["event_id"]] = (since, number)
             switch[where] = (row["event_id"], row["ts_ns"], row["next_tid"], number)
             of_cpu.clear()
-        elif role is CpuRole.WAKING:
+        elif role == "waking":
             innermost = max(of_cpu, key=lambda one: of_cpu[one][0]) if of_cpu else None
             found[row["event_id"]] = (last[0] if last else None, innermost)
-        elif role is CpuRole.BEGIN:
+        elif role == "begin":
             of_cpu[kind] = (row["event_id"], row["ts_ns"])
         elif kind in of_cpu:
             _, since = of_cpu.pop(kind)

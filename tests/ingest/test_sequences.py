@@ -146,6 +146,6 @@ def test_two_changes_of_the_cpu_in_no_time(of_round: list[Event]) -> None:
 def _value(event: Event | None, origin: Origin) -> Any:
     if event is None:
         return None
-    if origin is Origin.LABEL:
+    if origin == "label":
         return load().tracepoints[event["name"]].label
-    return event[origin.value]
+    return event[origin]

@@ -17,7 +17,8 @@ from typing import Any
 import duckdb
 import pyarrow as pa
 
-from msgflow.ingest import overlapping_traces, staging
+from msgflow.db.store import empty
+from msgflow.ingest import overlapping_traces
 from msgflow.ingest.catalogue import Tracepoint, load
 from msgflow.ingest.cpus import Cpus
 from msgflow.ingest.load import without_thread
@@ -208,7 +209,7 @@ class StagedEvents:
         self._read(con, batches, packets)
         corrections = overlapping_traces.corrections_of(con)
         if corrections:
-            staging.empty(con)
+            empty(con, "raw")
             self._read(con, [(n, corrections.applied(batch)) for n, batch in batches], packets)
 
     def _read(

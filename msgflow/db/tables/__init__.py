@@ -9,7 +9,7 @@ of `schema/public`; what their columns share with the table stands only here. Fo
 
 The comment of a table states its grain, the comment of a column its meaning. `column.py` documents
 what their `info` holds. Each `ForeignKey` declares a relation. Databases do not have it: DuckDB's
-foreign keys would forbid replacing a run in one transaction. `relation_check.py` proves it instead.
+foreign keys would forbid replacing a run in one transaction. `finding.py` proves it instead.
 """
 
 from msgflow.db.tables import call, identity, link, recording, ros_object, schedule

@@ -5,7 +5,7 @@
 -- cure: Report what msgflow check --detail prints, together with the trace.
 -- grain: one row per run and column with such identities
 -- severity: error
--- param: broken STRUCT[]  Run, column, table it refers to, count; from `relation_check.py`
+-- param: broken STRUCT[]  Run, column, table it refers to, count; from `msgflow/db/finding.py`
 SELECT
     broken.run_id, broken.child AS subject, broken.count,
     'identities that are no row of ' || broken.parent AS detail
