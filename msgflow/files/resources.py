@@ -17,7 +17,8 @@ def resource_directory(name: str) -> Path:
     packaged = package / "_data" / name
     if packaged.is_dir():
         return packaged
-    checkout = package.parent / name
-    if checkout.with_name("pyproject.toml").is_file() and checkout.is_dir():
+    root = package.parent
+    checkout = root / name
+    if (root / "pyproject.toml").is_file() and checkout.is_dir():
         return checkout
     raise FileNotFoundError(f"msgflow is installed without its {name}/ directory")

@@ -3,6 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from header_rules import faults
 
 from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Column, Header, HeaderError, Param, parse
@@ -130,18 +131,10 @@ def test_a_macro_keeps_its_whole_statement() -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("-- colour: red", "example.sql:3: unknown field 'colour'"),
-        ("-- title: again", "example.sql:3: 'title' stands twice"),
         ("--param: a BIGINT  x", "example.sql:3: expected '-- field: value'"),
-        ("-- kind: macro", "says only that its kind is 'inline', not 'macro'"),
         ("-- param: a", "example.sql:3: expected '-- param: name TYPE"),
         ("-- param: a BIGINT = 1 one space", "expected '-- param: name TYPE"),
         ("-- param: a BIGINT = one  Default", "'one' is not NULL, TRUE, FALSE, a number"),
-        ("-- param: a VARCHAR {b|c} = 'd'  x", "the default 'd' is not among the choices"),
-        ("-- param: a BIGINT {1..} = 0  x", "the default 0 is less than 1"),
-        ("-- param: a BIGINT {1..9} = 10  x", "the default 10 is more than 9"),
-        ("-- param: a VARCHAR {1..}  x", "only an integer has a minimum"),
-        ("-- note: moon", "note 'moon' is not one of clocks"),
         ("-- param: a BIGINT  x\n-- param: a BIGINT  y", "'a' stands twice"),
         ("-- column: a-b", "example.sql:3: expected '-- column: name TYPE [unit]"),
         ("-- column: a BIGINT  x\n-- column: a BIGINT  y", "'a' stands twice"),
@@ -186,15 +179,40 @@ def test_steps_of_another_file_come_first(tmp_path: Path) -> None:
         ("SELECT 1\n", "there is no header"),
         ("", "there is no header"),
         ("--     first\nSELECT 1\n", "starts with a continuation"),
-        ("-- title: x\nSELECT 1\n", "the header has no 'description'"),
-        ("-- description: x\n\n", "there is no SQL below the header"),
-        (
-            "-- description: x\n-- brief: a\nSELECT 1\n",
-            "brief names a column that there is not: 'a'",
-        ),
     ],
 )
 def test_an_incomplete_file_is_refused(text: str, message: str) -> None:
     with pytest.raises(HeaderError) as raised:
         parse(text, PATH)
     assert message in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("-- colour: red", "unknown field 'colour'"),
+        ("-- title: again", "'title' stands twice"),
+        ("-- kind: macro", "says only that its kind is 'inline', not 'macro'"),
+        ("-- param: a VARCHAR {b|c} = 'd'  x", "the default 'd' is not among the choices"),
+        ("-- param: a BIGINT {1..} = 0  x", "the default 0 is less than 1"),
+        ("-- param: a BIGINT {1..9} = 10  x", "the default 10 is more than 9"),
+        ("-- param: a VARCHAR {1..}  x", "only an integer has a minimum"),
+        ("-- note: moon", "note 'moon' is not one of callbacks"),
+        ("-- brief: a", "the header names a column that there is not: 'a'"),
+        ("-- zero: a", "the header names a column that there is not: 'a'"),
+    ],
+)
+def test_what_breaks_a_rule_is_found(line: str, message: str) -> None:
+    text = f"-- title: x\n-- description: x\n{line}\nSELECT 1\n"
+    assert [fault for fault in faults(text, parse(text, PATH)) if message in fault]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("-- title: x\nSELECT 1\n", "the header has no 'description'"),
+        ("-- description: x\n\n", "there is no SQL below the header"),
+    ],
+)
+def test_what_is_missing_is_found(text: str, message: str) -> None:
+    assert list(faults(text, parse(text, PATH))) == [message]

@@ -11,6 +11,7 @@ from pathlib import Path
 import duckdb
 import pytest
 from each import each
+from header_rules import faults
 from sql_files import LAYERS, SqlFile, sql_files, sql_paths
 
 from msgflow.cli.operation import OWN
@@ -244,6 +245,11 @@ def test_columns_of_a_view_are_those_of_its_output(
     output = described(connection.sql(f"FROM {file.header.name}"))
     if file.layer == "public" or file.header.columns:
         assert output == declared(file)
+
+
+@each(FILES)
+def test_a_header_keeps_to_the_rules(file: SqlFile) -> None:
+    assert list(faults(file.path.read_text(encoding="utf-8"), file.header)) == []
 
 
 @pytest.mark.thorough
