@@ -6,7 +6,7 @@ A public view that shows a table unchanged has no file: `store.sql` says of the 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
@@ -128,15 +128,23 @@ def definition_hash() -> str:
 
 def sources_of(names: Iterable[str]) -> frozenset[str]:
     """Return these objects and tables, and all that they read, directly or not."""
-    by_name = {header.name: header for header in views()}
+    known = {header.name: header for header in views()}
+
+    def needs_of(name: str) -> Iterable[str]:
+        return (*known[name].needs, *sources(known, name)) if name in known else ()
+
+    return frozenset(reached(names, needs_of))
+
+
+def reached(names: Iterable[str], needs_of: Callable[[str], Iterable[str]]) -> set[str]:
+    """Return these names, and all that they need, directly or not."""
     found: set[str] = set()
     waiting = list(names)
     while waiting:
         if (name := waiting.pop()) not in found:
             found.add(name)
-            if name in by_name:
-                waiting += [*by_name[name].needs, *sources(by_name, name)]
-    return frozenset(found)
+            waiting += needs_of(name)
+    return found
 
 
 @cache

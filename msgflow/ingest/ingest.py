@@ -179,7 +179,9 @@ def ingest(
                 def write() -> tuple[int, str, tuple[Finding, ...]]:
                     watch.enter("building the model")
                     with staging.writing(con):
-                        model.build(con)
+                        # To drop small tables would free next to nothing.
+                        is_small = event_count < staging.ROWS_PER_INSERT
+                        model.build(con, keep=is_small or keep_staging is not None)
                     if is_new:
                         migration.create(target)
                         attach(con, target, is_new=True)

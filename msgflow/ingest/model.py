@@ -7,14 +7,15 @@ has its empty table.
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from functools import cache
 from typing import TYPE_CHECKING
 
 from msgflow.db import objects
 from msgflow.db.finding import kinds_with_rows, statement
+from msgflow.db.store_table import store_tables
 from msgflow.files.resources import resource_directory
 from msgflow.ingest import staging
 from msgflow.ingest.caret_initialisation import restore
@@ -31,15 +32,22 @@ _FINDING = "staging.finding"
 _TABLE = re.compile(r"CREATE TABLE ([a-z_.]+) \([^;]*;")
 
 
-def build(con: duckdb.DuckDBPyConnection, *, findings: bool = True) -> None:
+def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool = True) -> None:
     """Create every object of these folders, each from those before it."""
+    headers = objects.model()
+    if not findings:
+        headers = tuple(header for header in headers if header.name != _FINDING)
     empty = staging.empty_tables(con)
     if any([restore(con, empty), translate(con, empty)]):
         empty = staging.empty_tables(con)
     staging.narrow(con, empty)
-    for header in objects.model():
-        if findings or header.name != _FINDING:
-            create(con, header, empty)
+    last_uses = {} if keep else _last_uses(headers)
+    for position, header in enumerate(headers):
+        create(con, header, empty)
+        for name, last_use in last_uses.items():
+            # A table without rows is no burden.
+            if last_use == position and name not in empty:
+                con.execute(f"DROP TABLE {name}")
 
 
 def translate(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
@@ -84,8 +92,43 @@ def may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str
     )
 
 
-@cache
+@functools.cache
 def _empty_tables() -> Mapping[str, str]:
     """Return the statement that makes each table of the model without a row."""
     text = (resource_directory("schema") / "model.sql").read_text(encoding="utf-8")
     return {match[1]: match[0] for match in _TABLE.finditer(text)}
+
+
+def _last_uses(headers: tuple[Header, ...]) -> dict[str, int]:
+    """Return the position of the last object that needs a table: of each, built or read.
+
+    Tables that `store` copies, and what they need at that moment, are not in it.
+    """
+    stored = {f"staging.{name}" for name in store_tables()}
+    unfolded = {header.name: header for header in headers if header.kind != "view"}
+
+    def needs_of(name: str) -> frozenset[str]:
+        return _needs(unfolded[name]) if name in unfolded else frozenset()
+
+    last = dict.fromkeys(_raw_tables(), 0)
+    for position, header in enumerate(headers):
+        if header.kind == "view":
+            last[header.name] = position
+            needs = objects.reached(_needs(header), needs_of)
+            last |= dict.fromkeys(needs & last.keys(), position)
+    kept = objects.reached(stored, needs_of)
+    return {name: position for name, position in last.items() if name not in kept}
+
+
+@functools.cache
+def _needs(header: Header) -> frozenset[str]:
+    """Return what an object needs, with the tables of `raw` one by one."""
+    if staging.OF_ALL_EVENTS & set(header.needs):
+        return frozenset(header.needs) | _raw_tables()
+    words = re.findall(r"\w+", header.body)
+    return frozenset(header.needs) | {f"raw.{word}" for word in words} & _raw_tables()
+
+
+@functools.cache
+def _raw_tables() -> frozenset[str]:
+    return frozenset(f"raw.{tracepoint.table}" for tracepoint in load().staged.values())

@@ -77,7 +77,7 @@ def ingest_again(
                 interrupts=interrupts,
                 progress=None,
             )
-            model.build(con, findings=False)
+            model.build(con, keep=True, findings=False)
             with transaction(con):
                 run_id, _ = store_run(con, name, name)
                 _derive(con, run_id, links, clocks, leave_out)

@@ -36,7 +36,7 @@ MOST_WAITING = 500_000
 
 _COLUMNS = ", ".join(name for name, _ in COMMON_COLUMNS)
 # Views of all events, which unite the tables of all tracepoints.
-_OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
+OF_ALL_EVENTS = {"staging.event", "staging.predecessor"}
 
 
 def attach(con: duckdb.DuckDBPyConnection, directory: Path | None) -> None:
@@ -117,7 +117,7 @@ def export(con: duckdb.DuckDBPyConnection, directory: Path) -> None:
     files = {
         f"{name}.parquet": name
         for (name,) in found
-        if name not in _OF_ALL_EVENTS and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall()
+        if name not in OF_ALL_EVENTS and con.execute(f"SELECT 1 FROM {name} LIMIT 1").fetchall()
     }
     with replacing_entries(directory, list(files), force=True) as aside:
         for file, name in files.items():

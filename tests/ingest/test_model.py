@@ -284,6 +284,27 @@ def test_an_object_without_a_row_has_its_columns_all_the_same(planned: dict[str,
             assert columns == planned[header.name][0], header.name
 
 
+def test_what_was_read_is_dropped_once_nothing_needs_it(lossy: Path) -> None:
+    """Only what is not evaluated before it is stored stays until then."""
+    with duckdb.connect() as con:
+        read(con, lossy)
+        before = tables_with_rows(con)
+        model.build(con)
+        after = tables_with_rows(con)
+    assert len(before) > 20
+    states = ("get_next_ready", "wait_for_work", "execute")
+    assert after == {"packet", "thread", "thread_name"} | {
+        f"ros2_rclcpp_executor_{state}" for state in states
+    }
+
+
+def tables_with_rows(con: duckdb.DuckDBPyConnection) -> set[str]:
+    rows = con.execute(
+        "SELECT table_name FROM duckdb_tables() WHERE database_name = 'raw' AND estimated_size > 0"
+    ).fetchall()
+    return {name for (name,) in rows}
+
+
 def test_a_full_disk_is_said_at_once(
     lossy: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
