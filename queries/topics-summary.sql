@@ -28,22 +28,7 @@
 --     latency_median_ns, latency_p95_ns, latency_max_ns, delivered, unknown
 -- answer: delivered, dropped, lost, unknown
 -- note: clocks
-WITH topic AS (
-    SELECT
-        run_id, topic_name,
-        sum(publisher)::BIGINT AS publisher_count,
-        sum(subscription)::BIGINT AS subscription_count,
-        bool_or(is_internal) AS is_internal
-    FROM (
-        SELECT run_id, topic_name, is_internal, 1 AS publisher, 0 AS subscription
-        FROM main.publisher
-        UNION ALL
-        SELECT run_id, topic_name, is_internal, 0, 1 FROM main.subscription
-    )
-    WHERE list_contains($runs, run_id)
-    GROUP BY run_id, topic_name
-),
-published AS (
+WITH published AS (
     SELECT
         b.run_id, p.topic_name, b.publisher_id, b.start_ns,
         b.start_ns - lag(b.start_ns) OVER (
@@ -110,9 +95,10 @@ SELECT
     l.quantiles[1] AS latency_median_ns,
     l.quantiles[2] AS latency_p95_ns,
     l.max_ns AS latency_max_ns, t.is_internal
-FROM topic AS t
+FROM main.topic AS t
 LEFT JOIN rate AS r ON t.run_id = r.run_id AND t.topic_name IS NOT DISTINCT FROM r.topic_name
 LEFT JOIN jitter AS j ON t.run_id = j.run_id AND t.topic_name IS NOT DISTINCT FROM j.topic_name
 LEFT JOIN delivery AS d ON t.run_id = d.run_id AND t.topic_name IS NOT DISTINCT FROM d.topic_name
 LEFT JOIN latency AS l ON t.run_id = l.run_id AND t.topic_name IS NOT DISTINCT FROM l.topic_name
+WHERE list_contains($runs, t.run_id)
 ORDER BY t.run_id, t.topic_name NULLS LAST

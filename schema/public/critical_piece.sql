@@ -48,11 +48,9 @@ CREATE OR REPLACE MACRO main.critical_piece(
 ) AS TABLE
 WITH RECURSIVE given AS MATERIALIZED (
     SELECT
-        run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, part, from_ns, to_ns,
-        callback_instance_id, publication_id,
-        dense_rank() OVER (ORDER BY latency_ns DESC, flow_id) AS flow_rank,
         -- Here positions go on from flow to flow.
-        row_number() OVER (ORDER BY latency_ns DESC, flow_id, position) AS position
+        * REPLACE (row_number() OVER (ORDER BY latency_ns DESC, flow_id, position) AS position),
+        dense_rank() OVER (ORDER BY latency_ns DESC, flow_id) AS flow_rank
     FROM query_table(parts)
 ),
 -- What a server did lies within its call, though its clock or a late event may say otherwise. Of
@@ -153,10 +151,6 @@ waited AS MATERIALIZED (
 ),
 wait_here AS NOT MATERIALIZED (FROM derive.callback_ready('waited')),
 ready AS MATERIALIZED (
-    SELECT
-        run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
-        earliest_ns, latest_ns, start_ns, picked_ns, thread_count, previous_wait_end_ns,
-        wait_start_ns, is_loss_affected
     FROM query_table(waits)
     WHERE callback_instance_id IN (SELECT callback_instance_id FROM waiting)
 ),
@@ -386,8 +380,7 @@ named AS (
 -- Neighbours that are the same thing become one.
 numbered AS (
     SELECT
-        run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, part, position,
-        from_ns, to_ns, activity, is_certain, callback_instance_id, publication_id, request_id,
+        *,
         row_number() OVER (PARTITION BY position ORDER BY from_ns)
         - row_number() OVER (
             PARTITION BY position, activity, is_certain, callback_instance_id, publication_id
@@ -440,34 +433,15 @@ interval AS MATERIALIZED (
         AND (w.request_id IS NULL OR w.thread_id IS NOT NULL)
 )
 SELECT
-    w.run_id,
-    w.path_id,
-    w.root_kind,
-    w.root_id,
-    w.take_id,
-    w.latency_ns,
-    w.flow_rank,
-    w.hop,
-    row_number() OVER (
-        PARTITION BY w.flow_rank ORDER BY w.interval_id, s.from_ns
-    ) AS position,
-    w.part,
-    w.activity,
+    w.run_id, w.path_id, w.root_kind, w.root_id, w.take_id, w.latency_ns, w.flow_rank, w.hop,
+    row_number() OVER (PARTITION BY w.flow_rank ORDER BY w.interval_id, s.from_ns) AS position,
+    w.part, w.activity,
     coalesce(s.from_ns, w.from_ns) AS from_ns,
     coalesce(s.to_ns, w.to_ns) AS to_ns,
     coalesce(s.to_ns - s.from_ns, w.duration_ns) AS duration_ns,
-    w.is_certain,
-    w.callback_instance_id,
-    w.publication_id,
-    s.state,
-    s.wakers,
-    s.thread_id AS state_thread_id,
-    s.priority,
-    s.by_kind,
-    s.by_thread_id,
-    s.by_other_thread_id,
-    s.by_priority,
-    w.request_id
+    w.is_certain, w.callback_instance_id, w.publication_id, s.state, s.wakers,
+    s.thread_id AS state_thread_id, s.priority, s.by_kind, s.by_thread_id, s.by_other_thread_id,
+    s.by_priority, w.request_id
 FROM whole AS w
 LEFT JOIN (FROM main.schedule_piece('interval', runs) WHERE has_kernel) AS s
     ON w.interval_id = s.interval_id AND s.state IS NOT NULL

@@ -54,15 +54,9 @@ CREATE OR REPLACE MACRO main.end_to_end(
     has_states := true
 ) AS TABLE
 WITH RECURSIVE chain_here AS MATERIALIZED (
-    SELECT
-        run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
-        first_publisher_id, first_route, route, is_cached, is_path
     FROM main.flow_chain(runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths)
 ),
 chain AS NOT MATERIALIZED (
-    SELECT
-        run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
-        first_publisher_id, first_route, route, is_cached, is_path
     FROM query_table(chains)
     WHERE derive.known_word('from_event', from_event, ['callback_start', 'publish'])
         AND derive.known_word('to_event', to_event, ['take', 'callback_start', 'callback_end'])
@@ -75,10 +69,7 @@ lineage (path_id, prefix_id, depth, parent_path_id) AS (
     JOIN chain AS c ON l.parent_path_id = c.path_id
 ),
 path AS MATERIALIZED (
-    SELECT
-        run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
-        first_publisher_id, first_route, route, is_cached, is_path,
-        dense_rank() OVER (ORDER BY publisher_id, subscription_id, route) AS way_id
+    SELECT *, dense_rank() OVER (ORDER BY publisher_id, subscription_id, route) AS way_id
     FROM chain
     WHERE path_id IN (SELECT prefix_id FROM lineage)
 ),
@@ -175,11 +166,7 @@ pair AS MATERIALIZED (
         END AS sink_ns
     FROM arrival AS a
     JOIN sink AS k ON a.path_id = k.path_id
-    WHERE CASE k.sink_event
-        WHEN 'take' THEN a.taken_ns
-        WHEN 'callback_start' THEN a.start_ns
-        ELSE a.end_ns
-    END IS NOT NULL
+    WHERE sink_ns IS NOT NULL
 ),
 expected AS MATERIALIZED (
     SELECT

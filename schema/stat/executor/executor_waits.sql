@@ -15,10 +15,7 @@ exclusion AS MATERIALIZED (FROM derive.callback_exclusion WHERE has_teams),
 -- for as long as it was in all before, and not at all from the end of the last one.
 ready AS MATERIALIZED (
     SELECT
-        r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.since,
-        r.origin_ns, r.earliest_ns, r.latest_ns, r.start_ns, r.thread_count, r.picked_ns,
-        r.wait_start_ns, r.wait_end_ns, r.wait_before_ns, r.previous_wait_end_ns,
-        r.is_loss_affected, b.before_ns AS start_busy_ns,
+        r.*, b.before_ns AS start_busy_ns,
         CASE WHEN r.earliest_ns >= coalesce(b.previous_end_ns, r.earliest_ns) THEN b.before_ns END
             AS earliest_busy_ns,
         CASE WHEN r.latest_ns >= coalesce(b.previous_end_ns, r.latest_ns) THEN b.before_ns END
