@@ -5,13 +5,10 @@
 --     effect. The newest root that an arrival reflects says how old the data were. Give --from and
 --     --to: else there is a row for each two topics between which a path leads.
 -- grain: one row per topic where flows start, topic where they end, and node that takes it
--- like: e2e-latency
+-- like: e2e-latency, main.end_to_end_between
 -- steps: path_chain, path_outcome, named_path
 -- param: from, to, from_event, to_event, max_depth, max_paths
--- column: run_id
--- column: first_topic VARCHAR [topic]  Topic of the first message
--- column: last_topic VARCHAR [topic]  Topic of the last message
--- column: node VARCHAR [node]      Node that takes it
+-- column: run_id, first_topic, last_topic, node
 -- column: paths BIGINT             Paths between them
 -- column: roots
 -- column: reached BIGINT           Roots that arrived, by any path

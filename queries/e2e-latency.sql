@@ -61,9 +61,6 @@ CREATE OR REPLACE TEMP TABLE path_chain AS
 FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
 
 CREATE OR REPLACE TEMP TABLE path_outcome AS
-SELECT
-    run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
-    reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
     $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain',
     has_calls := $has_calls, has_gaps := $has_gaps, has_states := $has_states
@@ -97,8 +94,7 @@ GROUP BY path_id;
 
 WITH flow AS (
     SELECT
-        run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, latency_ns, status,
-        reason, is_first, is_loss_affected, is_ambiguous,
+        *,
         CASE $case
             WHEN 'first' THEN is_first
             WHEN 'last' THEN is_last

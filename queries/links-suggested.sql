@@ -106,8 +106,7 @@ fired AS (
 ),
 firing AS (
     SELECT
-        publisher_id, output_topic, node_id, subscription_id, callback_instance_id, start_ns,
-        published_ns,
+        *,
         lag(published_ns) OVER (
             PARTITION BY publisher_id ORDER BY published_ns, callback_instance_id
         ) AS emptied_ns

@@ -3,11 +3,8 @@
 --     messages, and how long they took to be taken, in the time window. The variants rate, delivery
 --     and latency say the same of each publisher and each subscription.
 -- grain: one row per topic
--- column: run_id BIGINT               Run
--- column: topic_name VARCHAR [topic]  Topic
--- column: publisher_count BIGINT      Publishers
--- column: subscription_count BIGINT   Subscriptions
--- column: publication_count BIGINT    Messages published
+-- like: topics
+-- column: run_id, topic_name, publisher_count, subscription_count, publication_count
 -- column: rate_hz DOUBLE [Hz]         Publications of all publishers per second, from the first to
 --     the last
 -- column: period_median_ns BIGINT [ns]  Median time from one publication of a publisher to its next
@@ -23,7 +20,7 @@
 -- column: latency_median_ns BIGINT [ns]  Median latency from publication to take
 -- column: latency_p95_ns BIGINT [ns]  95 % of the latencies are at most this
 -- column: latency_max_ns BIGINT [ns]  Longest latency
--- column: is_internal BOOLEAN         ROS uses it for itself
+-- column: is_internal
 -- brief: topic_name, publication_count, rate_hz, period_deviation_ns, dropped, lost, reasons,
 --     latency_median_ns, latency_p95_ns, latency_max_ns, delivered, unknown
 -- answer: delivered, dropped, lost, unknown

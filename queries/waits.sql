@@ -49,10 +49,7 @@
 --     busy_total_min_ns, busy_total_max_ns
 -- note: clocks
 WITH waited AS MATERIALIZED (
-    SELECT
-        w.run_id, w.callback_instance_id, k.alike_id AS callback_id, w.wait_ns, w.busy_min_ns,
-        w.busy_max_ns, w.held_max_ns, w.is_loss_affected, w.meanwhile_callback_ids, w.meanwhile_ns,
-        w.until_arrival_ns, w.run_queue_ns, w.preempted_ns, w.cpu_taken_by, w.cpu_taken_ns
+    SELECT w.* REPLACE (k.alike_id AS callback_id)
     FROM main.executor_wait_explained($runs) AS w
     JOIN main.callback_alike AS k ON w.callback_id = k.callback_id
     WHERE w.start_ns >= $start_ns AND w.start_ns < $end_ns

@@ -3,6 +3,7 @@
 --     services in a callback (main.waited_call) by what the service did. Where the kernel was
 --     traced, what a thread did is divided into its states (main.schedule_piece).
 -- grain: one row per piece of a flow
+-- like: main.end_to_end_part
 -- param: parts VARCHAR  Name of the rows of main.end_to_end_part: a table, or a part of the query
 -- param: runs BIGINT[]  Runs that they are of
 -- param: waits VARCHAR = 'wait_here'  Name of a table of when inputs became ready, by the clocks of
@@ -10,27 +11,20 @@
 -- param: has_kernel BOOLEAN = true  A kernel trace was read; false: nothing is looked up in it
 -- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
 -- param: has_teams BOOLEAN = true  Executors have several threads; false: each has one
--- column: run_id BIGINT  Run
--- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
--- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
--- column: root_id BIGINT  Identity of the root
--- column: take_id BIGINT  Take at the end of the path
--- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: run_id, path_id, root_kind, root_id, take_id, latency_ns
 -- column: flow_rank BIGINT  Number of the flow, the longest first
 -- column: hop BIGINT  Number of the message on the path that it belongs or leads to
--- column: position BIGINT  Order within the flow, from 1
+-- column: position
 -- column: part VARCHAR  Part of the flow, as in main.end_to_end_part
 -- column: activity VARCHAR  What happened: the part itself; up to a take 'network_or_idle',
 --     'executor_busy' (it ran something else), 'all_threads_busy', 'blocked' (a callback ran that
 --     excludes the waiting one) or 'undecided' (nothing shows when the message arrived); in a cache
 --     'timer' (not due yet), 'unpublished' (the message that was waited for), or a part of that
 --     message's own flow
--- column: from_ns BIGINT [epoch ns]  Begin
--- column: to_ns BIGINT [epoch ns]  End
--- column: duration_ns BIGINT [ns]  to_ns - from_ns
+-- column: from_ns, to_ns, duration_ns
 -- column: is_certain BOOLEAN  For 'executor_busy', 'all_threads_busy' and 'blocked': what waited
 --     was ready by then; false: it may have arrived meanwhile. NULL for others
--- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
+-- column: callback_instance_id
 -- column: publication_id BIGINT  Message that is published, under way or waited for
 -- column: state VARCHAR  State of the thread, as in main.schedule_piece; NULL: not traced by the
 --     kernel, or no thread's doing
@@ -157,19 +151,15 @@ ready AS MATERIALIZED (
 wait AS MATERIALIZED (
     SELECT
         r.callback_instance_id, r.executor_id, r.thread_id, r.callback_id, r.since,
-        derive.corrected_ns(r.origin_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS origin_ns,
-        derive.corrected_ns(
-            coalesce(r.earliest_ns, r.latest_ns), c.offset_ns, c.drift_ppb, c.reference_ns
-        ) AS earliest_ns,
-        derive.corrected_ns(r.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latest_ns,
-        derive.corrected_ns(r.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
+        derive.corrected_ns(r.origin_ns, c) AS origin_ns,
+        derive.corrected_ns(coalesce(r.earliest_ns, r.latest_ns), c) AS earliest_ns,
+        derive.corrected_ns(r.latest_ns, c) AS latest_ns,
+        derive.corrected_ns(r.start_ns, c) AS start_ns,
         r.earliest_ns IS NOT NULL AS is_bounded,
-        CASE WHEN r.thread_count = 1 AND NOT r.is_loss_affected THEN derive.corrected_ns(
-            greatest(r.earliest_ns, r.previous_wait_end_ns),
-            c.offset_ns, c.drift_ppb, c.reference_ns
-        ) END AS away_ns,
-        derive.corrected_ns(r.wait_start_ns, c.offset_ns, c.drift_ppb, c.reference_ns)
-            AS back_ns
+        CASE WHEN r.thread_count = 1 AND NOT r.is_loss_affected
+            THEN derive.corrected_ns(greatest(r.earliest_ns, r.previous_wait_end_ns), c) END
+            AS away_ns,
+        derive.corrected_ns(r.wait_start_ns, c) AS back_ns
     FROM ready AS r
     JOIN store.thread AS t ON r.thread_id = t.thread_id
     JOIN derive.process_clock AS c ON t.process_id = c.process_id
@@ -241,8 +231,8 @@ unserved AS (
 full_house AS (
     SELECT
         b.executor_id,
-        derive.corrected_ns(b.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
-        derive.corrected_ns(b.end_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS end_ns
+        derive.corrected_ns(b.start_ns, c) AS start_ns,
+        derive.corrected_ns(b.end_ns, c) AS end_ns
     FROM derive.executor_full AS b
     JOIN (SELECT DISTINCT executor_id, process_id FROM meanwhile) AS p
         ON b.executor_id = p.executor_id
@@ -281,9 +271,9 @@ occupied AS (
     UNION ALL
     SELECT
         u.callback_instance_id, 3, 'all_threads_busy',
-        derive.corrected_ns(u.from_ns, c.offset_ns, c.drift_ppb, c.reference_ns),
-        derive.corrected_ns(u.to_ns, c.offset_ns, c.drift_ppb, c.reference_ns),
-        derive.corrected_ns(u.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns),
+        derive.corrected_ns(u.from_ns, c),
+        derive.corrected_ns(u.to_ns, c),
+        derive.corrected_ns(u.latest_ns, c),
         u.callback_instance_id
     FROM unserved AS u
     JOIN store.thread AS t ON u.thread_id = t.thread_id

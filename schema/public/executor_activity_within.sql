@@ -11,8 +11,8 @@ CREATE OR REPLACE MACRO main.executor_activity_within(runs, window_start_ns, win
 WITH activity AS (
     SELECT
         a.run_id, a.executor_id, a.thread_id, a.activity,
-        derive.corrected_ns(a.start_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS start_ns,
-        derive.corrected_ns(a.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS end_ns,
+        derive.corrected_ns(a.start_ns, p) AS start_ns,
+        derive.corrected_ns(a.end_ns, p) AS end_ns,
         a.callback_instance_id
     FROM derive.thread_activity(runs, window_start_ns, window_end_ns) AS a
     JOIN store.thread AS t ON a.thread_id = t.thread_id

@@ -2,15 +2,11 @@
 -- description: As the query waits says it of one run. The median of several callbacks is off
 --     by less than 1 %, all else is exact.
 -- grain: one row per node, callback and group of runs
--- like: queries.waits
--- column: label_group BIGINT        Group of runs
--- column: node VARCHAR [node]  Node of the callback
--- column: callback VARCHAR [callback]  What triggers it
--- column: runs BIGINT               Runs that have it
+-- like: queries.waits, action_latency
+-- column: label_group, node, callback, runs
 -- column: count BIGINT              Callback instances
 -- column: delayed_min, delayed_max, wait_median_ns, wait_max_ns, busy_worst_ns, busy_total_min_ns,
---     busy_total_max_ns, rest_total_min_ns, rest_total_max_ns, unknown, loss_affected
--- column: is_internal BOOLEAN       Infrastructure of ROS
+--     busy_total_max_ns, rest_total_min_ns, rest_total_max_ns, unknown, loss_affected, is_internal
 -- brief: node, callback, wait_median_ns, wait_max_ns, busy_worst_ns, runs, count,
 --     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
 WITH merged AS (

@@ -37,11 +37,7 @@ interrupt AS (
         i.end_ns + s.shift_ns AS end_ns
     FROM raw.interrupt AS i
     JOIN staging.schedule AS s ON i.trace_index = s.trace_index
-    JOIN staging.thread_tid AS t
-        ON s.clock_key = t.clock_key
-        AND i.tid = t.tid
-        AND i.start_ns + s.shift_ns >= t.from_ns
-        AND i.start_ns + s.shift_ns < t.until_ns
+    JOIN staging.thread_tid AS t ON staging.has_tid(t, s.clock_key, i.tid, i.start_ns + s.shift_ns)
     ASOF JOIN (SELECT * FROM staging.thread_state WHERE state = 'running') AS r
         ON t.thread_id = r.thread_id AND i.start_ns + s.shift_ns >= r.start_ns
     WHERE s.is_joined AND i.kind <> 'timer'

@@ -42,9 +42,7 @@ message AS (
             WHEN l.publication_id IS NULL AND t.source_timestamp_ns <= t.taken_ns
                 THEN t.source_timestamp_ns
             WHEN p.is_comparable THEN t.taken_ns - greatest(
-                derive.corrected_ns(t.taken_ns, tc.offset_ns, tc.drift_ppb, tc.reference_ns)
-                - derive.corrected_ns(b.end_ns, bc.offset_ns, bc.drift_ppb, bc.reference_ns),
-                0
+                derive.corrected_ns(t.taken_ns, tc) - derive.corrected_ns(b.end_ns, bc), 0
             )
         END AS origin_ns,
         CASE WHEN l.publication_id IS NULL THEN 'stamp' ELSE 'publication' END AS since,
@@ -62,9 +60,7 @@ request AS (
     SELECT
         q.request_id,
         CASE WHEN p.is_comparable THEN q.taken_ns - greatest(
-            derive.corrected_ns(q.taken_ns, rc.offset_ns, rc.drift_ppb, rc.reference_ns)
-            - derive.corrected_ns(q.sent_ns, sc.offset_ns, sc.drift_ppb, sc.reference_ns),
-            0
+            derive.corrected_ns(q.taken_ns, rc) - derive.corrected_ns(q.sent_ns, sc), 0
         ) END AS origin_ns,
         q.taken_ns
     FROM store.request AS q

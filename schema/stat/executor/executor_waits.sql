@@ -184,10 +184,10 @@ measured AS (
 )
 SELECT
     r.run_id, r.callback_instance_id, r.executor_id, r.thread_id, r.callback_id, r.since,
-    derive.corrected_ns(r.origin_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS origin_ns,
-    derive.corrected_ns(r.earliest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS earliest_ns,
-    derive.corrected_ns(r.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latest_ns,
-    derive.corrected_ns(r.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
+    derive.corrected_ns(r.origin_ns, c) AS origin_ns,
+    derive.corrected_ns(r.earliest_ns, c) AS earliest_ns,
+    derive.corrected_ns(r.latest_ns, c) AS latest_ns,
+    derive.corrected_ns(r.start_ns, c) AS start_ns,
     r.start_ns - r.origin_ns AS wait_ns,
     r.busy_start_ns - r.busy_latest_ns + r.blocked_min_ns AS busy_min_ns,
     r.busy_start_ns - r.busy_earliest_ns + r.blocked_max_ns AS busy_max_ns,
