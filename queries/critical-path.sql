@@ -5,12 +5,10 @@
 --     Unless detail is full, those below 1 % are summed up as 'rest'. Flows with a stored message
 --     have no latency, and are left out.
 -- grain: one row per flow and piece, node or activity
--- like: e2e-latency
+-- like: e2e-latency, functions
 -- steps: path_chain, path_outcome, named_path
 -- param: from VARCHAR = NULL  Topics or nodes where flows start
--- param: to
--- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
--- param: without VARCHAR = NULL  Only flows through none of these
+-- param: to, via, without
 -- param: slowest BIGINT {1..} = 1  Number of flows
 -- param: quantile VARCHAR {median|p90|p95|p99|max} = NULL  Instead, the flow at this quantile of
 --     the latency

@@ -70,20 +70,12 @@ arrival AS MATERIALIZED (
         CASE WHEN is_newest THEN latency_ns END AS newest_ns
     FROM main.end_to_end_between('flow')
 ),
-affected AS (
-    SELECT run_id, first_topic, last_topic, node, count(*) AS number
-    FROM (
-        SELECT DISTINCT run_id, first_topic, last_topic, node, root_kind, root_id
-        FROM arrival
-        WHERE is_loss_affected
-    )
-    GROUP BY run_id, first_topic, last_topic, node
-),
 measured AS (
     SELECT
         run_id, first_topic, last_topic, node,
         histogram(CASE WHEN is_first IS NOT false THEN status END)::MAP(VARCHAR, BIGINT) AS number,
         count(*) FILTER (WHERE is_first IS NOT false) AS roots,
+        count(DISTINCT (root_kind, root_id)) FILTER (is_loss_affected) AS loss_affected,
         count(DISTINCT take_id) AS messages,
         count(latency_ns) AS pairs,
         count(take_id) AS arrivals,
@@ -118,7 +110,7 @@ SELECT
     coalesce(m.number['not_connected'], 0) AS not_connected,
     coalesce(m.number['unknown'], 0) AS unknown,
     coalesce(m.number['cut_by_recording'], 0) AS cut_by_recording,
-    coalesce(a.number, 0) AS loss_affected,
+    coalesce(m.loss_affected, 0) AS loss_affected,
     coalesce(m.ambiguous, 0) AS ambiguous,
     coalesce(m.messages, 0) AS messages,
     coalesce(m.pairs, 0) AS pairs,
@@ -150,9 +142,4 @@ LEFT JOIN measured AS m
     AND n.first_topic IS NOT DISTINCT FROM m.first_topic
     AND n.last_topic IS NOT DISTINCT FROM m.last_topic
     AND n.node = m.node
-LEFT JOIN affected AS a
-    ON n.run_id = a.run_id
-    AND n.first_topic IS NOT DISTINCT FROM a.first_topic
-    AND n.last_topic IS NOT DISTINCT FROM a.last_topic
-    AND n.node = a.node
 ORDER BY n.run_id, n.first_topic, n.last_topic, n.node

@@ -6,9 +6,8 @@
 -- variant: measure VARCHAR {callbacks|threads|cpu|preemption|wakeup} = 'callbacks'  What is
 --     measured: the states of callbacks, those of threads, the CPU time of threads of all
 --     processes, who took the CPU from which thread, or how long woken threads waited for one
--- column: run_id BIGINT             Run
--- column: node VARCHAR [node]  Node of the callback
--- column: callback VARCHAR [callback]  What triggers it
+-- like: callbacks-each
+-- column: run_id, node, callback
 -- column: count BIGINT              Callback instances that began in the time window and ended
 -- column: median_ns BIGINT [ns]     Median duration
 -- column: max_ns BIGINT [ns]        Longest duration
@@ -28,8 +27,7 @@
 -- column: preemptions BIGINT        How often the CPU was taken away
 -- column: migrations BIGINT         How often a callback went on on another CPU
 -- column: loss_affected BIGINT      Callback instances during which kernel events were lost
--- column: callback_id BIGINT        Identity of the callback
--- column: is_internal BOOLEAN       Infrastructure of ROS
+-- column: callback_id, is_internal
 -- brief: node, callback, preempted_ns, median_ns, running_median_ns, running_p99_ns, count,
 --     sleeping_ns, runnable_ns, preemptions, max_ns
 -- note: kernel

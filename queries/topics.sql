@@ -7,12 +7,10 @@
 --     is measured: numbers of messages, rates and periods by publisher, the latency from
 --     publication to take, what became of the messages, messages and takes without a partner, one
 --     by one, or the most important of these by topic
--- column: run_id BIGINT               Run
+-- like: main.topic
+-- column: run_id
 -- column: topic_name VARCHAR [topic]  Topic
--- column: publisher_count BIGINT      Publishers
--- column: subscription_count BIGINT   Subscriptions
--- column: publication_count BIGINT    Messages published
--- column: take_count BIGINT           Messages handed over to a subscription
+-- column: publisher_count, subscription_count, publication_count, take_count
 -- column: is_internal BOOLEAN         ROS uses it for itself
 -- brief: topic_name, publication_count, take_count, publisher_count, subscription_count
 SELECT

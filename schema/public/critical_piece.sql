@@ -3,7 +3,7 @@
 --     services in a callback (main.waited_call) by what the service did. Where the kernel was
 --     traced, what a thread did is divided into its states (main.schedule_piece).
 -- grain: one row per piece of a flow
--- like: main.end_to_end_part
+-- like: main.end_to_end_part, main.schedule_piece
 -- param: parts VARCHAR  Name of the rows of main.end_to_end_part: a table, or a part of the query
 -- param: runs BIGINT[]  Runs that they are of
 -- param: waits VARCHAR = 'wait_here'  Name of a table of when inputs became ready, by the clocks of
@@ -33,9 +33,7 @@
 -- column: priority INTEGER  Its priority, as the kernel has it: 0 to 99 real-time, 100 to 139 nice
 -- column: by_kind VARCHAR  What took the CPU, or ended the sleep: 'thread', 'timer', 'interrupt' or
 --     'softirq'. NULL: not known, or the state needs none
--- column: by_thread_id BIGINT  That thread, of a ROS process
--- column: by_other_thread_id BIGINT  That thread, of another process
--- column: by_priority INTEGER  Its priority; known for what took the CPU
+-- column: by_thread_id, by_other_thread_id, by_priority
 -- column: request_id BIGINT  Request whose response the callback of the part waits for
 CREATE OR REPLACE MACRO main.critical_piece(
     parts, runs, waits := 'wait_here', has_kernel := true, has_calls := true, has_teams := true
