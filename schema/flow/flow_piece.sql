@@ -7,7 +7,10 @@
 --     latest_ns (another moment at which to cut), callback_instance_id, publication_id
 CREATE OR REPLACE MACRO derive.flow_piece(parts, candidates) AS TABLE
 WITH clipped AS MATERIALIZED (
-    SELECT c.* REPLACE (greatest(c.from_ns, p.from_ns) AS from_ns, least(c.to_ns, p.to_ns) AS to_ns)
+    SELECT
+        c.position, c.priority, c.activity, c.latest_ns, c.callback_instance_id, c.publication_id,
+        greatest(c.from_ns, p.from_ns) AS from_ns,
+        least(c.to_ns, p.to_ns) AS to_ns
     FROM query_table(candidates) AS c
     JOIN query_table(parts) AS p ON c.position = p.position
     WHERE c.to_ns > p.from_ns AND c.from_ns < p.to_ns AND c.to_ns > c.from_ns

@@ -23,11 +23,13 @@ WITH sized AS (
 ),
 release AS (
     SELECT
-        r.* EXCLUDE (latest_ns, returned_ns), s.thread_count,
-        least(r.latest_ns, min(CASE WHEN s.is_in_order THEN r.returned_ns END) OVER (
-            PARTITION BY r.thread_id ORDER BY r.start_ns, r.callback_instance_id
-            ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING
-        )) AS latest_ns
+        r.* REPLACE (
+            least(r.latest_ns, min(CASE WHEN s.is_in_order THEN r.returned_ns END) OVER (
+                PARTITION BY r.thread_id ORDER BY r.start_ns, r.callback_instance_id
+                ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING
+            )) AS latest_ns
+        ),
+        s.thread_count
     FROM derive.callback_release('sized', has_calls) AS r
     JOIN sized AS s ON r.executor_id = s.executor_id
 ),
