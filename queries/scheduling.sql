@@ -40,14 +40,10 @@ WITH measured AS (
         quantile_disc(s.running_ns, [0.5, 0.99]) AS quantiles,
         max(s.running_ns) AS running_max_ns,
         sum(i.end_ns - i.start_ns)::BIGINT AS total_ns,
-        sum(s.running_ns)::BIGINT AS running_ns,
-        sum(s.preempted_ns)::BIGINT AS preempted_ns,
-        sum(s.runnable_ns)::BIGINT AS runnable_ns,
-        sum(s.sleeping_ns)::BIGINT AS sleeping_ns,
-        sum(s.uninterruptible_ns)::BIGINT AS uninterruptible_ns,
-        sum(s.unknown_ns)::BIGINT AS unknown_ns,
-        sum(s.irq_ns)::BIGINT AS irq_ns,
-        sum(s.softirq_ns)::BIGINT AS softirq_ns,
+        sum(COLUMNS([
+            'running_ns', 'preempted_ns', 'runnable_ns', 'sleeping_ns', 'uninterruptible_ns',
+            'unknown_ns', 'irq_ns', 'softirq_ns'
+        ]))::BIGINT,
         sum(s.preemption_count)::BIGINT AS preemptions,
         sum(s.migration_count)::BIGINT AS migrations,
         count(*) FILTER (WHERE s.is_loss_affected) AS loss_affected

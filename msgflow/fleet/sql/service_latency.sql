@@ -14,12 +14,9 @@
 SELECT
     g.label_group, s.service_name, s.server, s.client,
     count(DISTINCT s.run) AS runs,
-    sum(s.requests)::BIGINT AS requests,
-    sum(s.answered)::BIGINT AS answered,
-    sum(s.not_taken)::BIGINT AS not_taken,
-    sum(s.not_answered)::BIGINT AS not_answered,
-    sum(s.not_received)::BIGINT AS not_received,
-    sum(s.negative)::BIGINT AS negative,
+    sum(COLUMNS([
+        'requests', 'answered', 'not_taken', 'not_answered', 'not_received', 'negative'
+    ]))::BIGINT,
     min(s.round_trip_min_ns) AS round_trip_min_ns,
     max(s.round_trip_median_ns) AS round_trip_median_most_ns,
     max(s.round_trip_p99_ns) AS round_trip_p99_most_ns,

@@ -15,10 +15,7 @@ WITH merged AS (
     SELECT
         g.label_group, t.topic_name, t.subscriber,
         count(DISTINCT t.run) AS runs,
-        sum(t.takes)::BIGINT AS takes,
-        sum(t.linked)::BIGINT AS linked,
-        sum(t.ambiguous)::BIGINT AS ambiguous,
-        sum(t.negative)::BIGINT AS negative,
+        sum(COLUMNS(['takes', 'linked', 'ambiguous', 'negative']))::BIGINT,
         min(t.min_ns) AS min_ns,
         CASE WHEN count(*) = 1 THEN any_value(t.median_ns) END AS median_ns,
         round(sum(t.mean_ns * t.linked) / nullif(sum(t.linked), 0))::BIGINT AS mean_ns,

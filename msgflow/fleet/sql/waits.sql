@@ -19,12 +19,10 @@ WITH merged AS (
         CASE WHEN count(*) = 1 THEN any_value(w.wait_median_ns) END AS wait_median_ns,
         max(w.wait_max_ns) AS wait_max_ns,
         max(w.busy_worst_ns) AS busy_worst_ns,
-        sum(w.busy_total_min_ns)::BIGINT AS busy_total_min_ns,
-        sum(w.busy_total_max_ns)::BIGINT AS busy_total_max_ns,
-        sum(w.rest_total_min_ns)::BIGINT AS rest_total_min_ns,
-        sum(w.rest_total_max_ns)::BIGINT AS rest_total_max_ns,
-        sum(w.unknown)::BIGINT AS unknown,
-        sum(w.loss_affected)::BIGINT AS loss_affected,
+        sum(COLUMNS([
+            'busy_total_min_ns', 'busy_total_max_ns', 'rest_total_min_ns', 'rest_total_max_ns',
+            'unknown', 'loss_affected'
+        ]))::BIGINT,
         bool_and(w.is_internal) AS is_internal
     FROM waits AS w
     JOIN run_group AS g ON w.run = g.run

@@ -72,11 +72,9 @@ recorded AS (
 )
 SELECT
     i.callback_instance_id,
-    coalesce(p.running_ns, 0)::BIGINT AS running_ns,
-    coalesce(p.preempted_ns, 0)::BIGINT AS preempted_ns,
-    coalesce(p.runnable_ns, 0)::BIGINT AS runnable_ns,
-    coalesce(p.sleeping_ns, 0)::BIGINT AS sleeping_ns,
-    coalesce(p.uninterruptible_ns, 0)::BIGINT AS uninterruptible_ns,
+    coalesce(COLUMNS([
+        'running_ns', 'preempted_ns', 'runnable_ns', 'sleeping_ns', 'uninterruptible_ns'
+    ]), 0)::BIGINT,
     (
         i.end_ns - i.start_ns - coalesce(p.running_ns, 0) - coalesce(p.preempted_ns, 0)
         - coalesce(p.runnable_ns, 0) - coalesce(p.sleeping_ns, 0)
