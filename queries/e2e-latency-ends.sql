@@ -76,10 +76,10 @@ measured AS (
         histogram(CASE WHEN is_first IS NOT false THEN status END)::MAP(VARCHAR, BIGINT) AS number,
         count(*) FILTER (WHERE is_first IS NOT false) AS roots,
         count(DISTINCT (root_kind, root_id)) FILTER (is_loss_affected) AS loss_affected,
+        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         count(DISTINCT take_id) AS messages,
         count(latency_ns) AS pairs,
         count(take_id) AS arrivals,
-        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         main.spread(first_ns) AS firsts,
         -- Of equally long ones the first, and of its arrivals the first.
         max(struct_pack(latency_ns := first_ns, before_ns := -root_ns, before_take := -take_id))
@@ -110,10 +110,7 @@ SELECT
     coalesce(m.number['not_connected'], 0) AS not_connected,
     coalesce(m.number['unknown'], 0) AS unknown,
     coalesce(m.number['cut_by_recording'], 0) AS cut_by_recording,
-    coalesce(m.loss_affected, 0) AS loss_affected,
-    coalesce(m.ambiguous, 0) AS ambiguous,
-    coalesce(m.messages, 0) AS messages,
-    coalesce(m.pairs, 0) AS pairs,
+    coalesce(COLUMNS(['loss_affected', 'ambiguous', 'messages', 'pairs']), 0),
     round(m.arrivals / nullif(m.number['reached'], 0), 2) AS per_root,
     m.firsts.min_ns AS first_min_ns,
     m.firsts.median_ns AS first_median_ns,

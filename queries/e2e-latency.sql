@@ -117,9 +117,9 @@ completeness AS (
 latency AS (
     SELECT
         run_id, path_id,
+        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         count(latency_ns) AS pairs,
         count(*) - count(latency_ns) AS stored,
-        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         any_value(sink_event) AS sink_event,
         main.spread(latency_ns) AS latency,
         -- Of equally long ones the first, and of its arrivals the first.
@@ -140,10 +140,7 @@ SELECT
     coalesce(c.number['not_connected'], 0) AS not_connected,
     coalesce(c.number['unknown'], 0) AS unknown,
     coalesce(c.number['cut_by_recording'], 0) AS cut_by_recording,
-    coalesce(c.loss_affected, 0) AS loss_affected,
-    coalesce(l.ambiguous, 0) AS ambiguous,
-    coalesce(l.pairs, 0) AS pairs,
-    coalesce(l.stored, 0) AS stored,
+    coalesce(COLUMNS(['loss_affected', 'ambiguous', 'pairs', 'stored']), 0),
     coalesce(o.number, 0) AS looped,
     unnest(l.latency),
     -l.longest.before_ns AS max_root_ns,

@@ -55,9 +55,9 @@ reason AS (
 latency AS (
     SELECT
         label_group, path,
+        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         count(latency_ns) AS pairs,
         count(*) - count(latency_ns) AS stored,
-        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         string_agg(DISTINCT sink_event, ', ' ORDER BY sink_event) AS sink_event,
         min(latency_ns) AS min_ns,
         quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
@@ -88,10 +88,7 @@ SELECT
     coalesce(c.number['not_connected'], 0) AS not_connected,
     coalesce(c.number['unknown'], 0) AS unknown,
     coalesce(c.number['cut_by_recording'], 0) AS cut_by_recording,
-    coalesce(c.loss_affected, 0) AS loss_affected,
-    coalesce(l.ambiguous, 0) AS ambiguous,
-    coalesce(l.pairs, 0) AS pairs,
-    coalesce(l.stored, 0) AS stored,
+    coalesce(COLUMNS(['loss_affected', 'ambiguous', 'pairs', 'stored']), 0),
     k.looped, l.min_ns,
     l.quantiles[1] AS median_ns,
     l.mean_ns,

@@ -13,9 +13,7 @@ WITH merged AS (
     SELECT
         g.label_group, w.node, w.callback,
         count(DISTINCT w.run) AS runs,
-        sum(w.count)::BIGINT AS count,
-        sum(w.delayed_min)::BIGINT AS delayed_min,
-        sum(w.delayed_max)::BIGINT AS delayed_max,
+        sum(COLUMNS(['count', 'delayed_min', 'delayed_max']))::BIGINT,
         CASE WHEN count(*) = 1 THEN any_value(w.wait_median_ns) END AS wait_median_ns,
         max(w.wait_max_ns) AS wait_max_ns,
         max(w.busy_worst_ns) AS busy_worst_ns,
