@@ -89,9 +89,14 @@ by_run AS (
     FROM main.link_causal
     GROUP BY run_id
     UNION ALL
-    SELECT run_id, measure, sum(affected)::BIGINT, sum(total)::BIGINT
-    FROM by_topic
-    GROUP BY run_id, measure
+    SELECT t.run_id, 'orphan_takes', count(o.take_id), count(*)
+    FROM main.take AS t
+    LEFT JOIN main.stat_orphan AS o ON t.take_id = o.take_id
+    GROUP BY t.run_id
+    UNION ALL
+    SELECT run_id, 'unknown_deliveries', sum((status = 'unknown')::BIGINT)::BIGINT, count(*)
+    FROM main.stat_delivery
+    GROUP BY run_id
 ),
 measured AS (
     SELECT
