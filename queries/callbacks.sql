@@ -5,9 +5,8 @@
 -- grain: one row per callback object that ran; one for all timers that a node made of one function
 --     and period
 -- variant: each BOOLEAN = false  Each callback instance, the longest first
--- column: run_id BIGINT             Run
--- column: node VARCHAR [node]  Node of the callback
--- column: callback VARCHAR [callback]  What triggers it
+-- like: scheduling, path-breakdown
+-- column: run_id, node, callback
 -- column: objects BIGINT            Callback objects that it stands for, timers made anew
 -- column: count BIGINT              Callback instances that began in the time window
 -- column: open BIGINT               Instances without an end
@@ -17,19 +16,16 @@
 -- column: period_median_ns BIGINT [ns]  Median time from one start to the next
 -- column: period_max_ns BIGINT [ns]     Longest time from one start to the next
 -- column: min_ns BIGINT [ns]        Shortest duration
--- column: median_ns BIGINT [ns]     Median duration
--- column: mean_ns BIGINT [ns]       Mean duration
--- column: p95_ns BIGINT [ns]        95 % of the durations are at most this
+-- column: median_ns, mean_ns, p95_ns
 -- column: p99_ns BIGINT [ns]        99 % of the durations are at most this
--- column: max_ns BIGINT [ns]        Longest duration
--- column: total_ns BIGINT [ns]      Sum of the durations
+-- column: max_ns, total_ns
 -- column: running_median_ns BIGINT [ns]  Median CPU time; empty: not traced by the kernel
--- column: running_p99_ns BIGINT [ns]    99 % of the CPU times are at most this
+-- column: running_p99_ns
 -- column: preempted_p99_ns BIGINT [ns]  99 % lost the CPU to other threads for at most this long
 -- column: preempted_ns BIGINT [ns]      Sum of the time for which others had the CPU
 -- column: symbol VARCHAR            Function registered for the callback
 -- column: callback_id BIGINT        Identity of the callback, of the first of several
--- column: is_internal BOOLEAN       Infrastructure of ROS
+-- column: is_internal
 -- brief: node, callback, count, median_ns, p99_ns, max_ns, running_p99_ns, preempted_p99_ns,
 --     p95_ns, period_median_ns, mean_ns
 -- note: callbacks

@@ -5,12 +5,10 @@
 --     Unless detail is full, those below 1 % are summed up as 'rest'. Flows with a stored message
 --     have no latency, and are left out.
 -- grain: one row per flow and piece, node or activity
--- like: e2e-latency
+-- like: e2e-latency, functions
 -- steps: path_chain, path_outcome, named_path
 -- param: from VARCHAR = NULL  Topics or nodes where flows start
--- param: to
--- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
--- param: without VARCHAR = NULL  Only flows through none of these
+-- param: to, via, without
 -- param: slowest BIGINT {1..} = 1  Number of flows
 -- param: quantile VARCHAR {median|p90|p95|p99|max} = NULL  Instead, the flow at this quantile of
 --     the latency
@@ -70,9 +68,6 @@ WITH path AS (
     FROM named_path
     WHERE ($via IS NOT NULL OR $without IS NOT NULL) AND main.path_visits(path, $via, $without)
 )
-SELECT
-    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
-    is_ambiguous
 FROM main.chosen_flow(
     'path_outcome', $case, sink_take_id := $take, most_flows := $slowest,
     at_quantile := CASE $quantile WHEN 'median' THEN 0.5 WHEN 'p90' THEN 0.9 WHEN 'p95' THEN 0.95
@@ -82,17 +77,12 @@ FROM main.chosen_flow(
 );
 
 CREATE OR REPLACE TEMP TABLE critical_trail AS
-SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
 FROM main.end_to_end_trail('critical_flow', $runs, chains := 'path_chain');
 
 CREATE OR REPLACE TEMP TABLE critical_part AS
-SELECT
-    flow_id, run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, position, part,
-    from_ns, to_ns, duration_ns, callback_instance_id, publication_id
 FROM main.end_to_end_piece('critical_flow', 'critical_trail', $runs);
 
 CREATE OR REPLACE TEMP TABLE critical_piece AS
-SELECT *
 FROM main.critical_piece(
     'critical_part', $runs, has_kernel := $has_kernel, has_calls := $has_calls,
     has_teams := $has_teams
@@ -216,9 +206,7 @@ folded AS (
 ),
 sorted AS (
     SELECT
-        run_id, flow_rank, position, at_ns, duration_ns, hop, part, activity, node, what,
-        is_certain, from_ns, callback_instance_id, publication_id, take_id, latency_ns, path_id,
-        state, who, thread, wakers, priority, who_priority, greatest(pieces, 1) AS pieces,
+        * REPLACE (greatest(pieces, 1) AS pieces),
         CASE
             WHEN $by = 'node' THEN coalesce(node, '')
             WHEN $by = 'part' THEN concat_ws(' ', activity, state)

@@ -69,9 +69,7 @@ measured AS (
 )
 SELECT
     p.run_id,
-    coalesce(m.outputs, 0) AS outputs,
-    coalesce(m.loss_affected, 0) AS loss_affected,
-    coalesce(m.ambiguous, 0) AS ambiguous,
+    coalesce(COLUMNS(['outputs', 'loss_affected', 'ambiguous']), 0),
     unnest(m.age),
     m.peaks[1] AS peak_median_ns,
     m.peaks[2] AS peak_p95_ns,

@@ -5,13 +5,10 @@
 --     effect. The newest root that an arrival reflects says how old the data were. Give --from and
 --     --to: else there is a row for each two topics between which a path leads.
 -- grain: one row per topic where flows start, topic where they end, and node that takes it
--- like: e2e-latency
+-- like: e2e-latency, main.end_to_end_between
 -- steps: path_chain, path_outcome, named_path
 -- param: from, to, from_event, to_event, max_depth, max_paths
--- column: run_id
--- column: first_topic VARCHAR [topic]  Topic of the first message
--- column: last_topic VARCHAR [topic]  Topic of the last message
--- column: node VARCHAR [node]      Node that takes it
+-- column: run_id, first_topic, last_topic, node
 -- column: paths BIGINT             Paths between them
 -- column: roots
 -- column: reached BIGINT           Roots that arrived, by any path
@@ -73,24 +70,16 @@ arrival AS MATERIALIZED (
         CASE WHEN is_newest THEN latency_ns END AS newest_ns
     FROM main.end_to_end_between('flow')
 ),
-affected AS (
-    SELECT run_id, first_topic, last_topic, node, count(*) AS number
-    FROM (
-        SELECT DISTINCT run_id, first_topic, last_topic, node, root_kind, root_id
-        FROM arrival
-        WHERE is_loss_affected
-    )
-    GROUP BY run_id, first_topic, last_topic, node
-),
 measured AS (
     SELECT
         run_id, first_topic, last_topic, node,
         histogram(CASE WHEN is_first IS NOT false THEN status END)::MAP(VARCHAR, BIGINT) AS number,
         count(*) FILTER (WHERE is_first IS NOT false) AS roots,
+        count(DISTINCT (root_kind, root_id)) FILTER (is_loss_affected) AS loss_affected,
+        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         count(DISTINCT take_id) AS messages,
         count(latency_ns) AS pairs,
         count(take_id) AS arrivals,
-        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         main.spread(first_ns) AS firsts,
         -- Of equally long ones the first, and of its arrivals the first.
         max(struct_pack(latency_ns := first_ns, before_ns := -root_ns, before_take := -take_id))
@@ -121,10 +110,7 @@ SELECT
     coalesce(m.number['not_connected'], 0) AS not_connected,
     coalesce(m.number['unknown'], 0) AS unknown,
     coalesce(m.number['cut_by_recording'], 0) AS cut_by_recording,
-    coalesce(a.number, 0) AS loss_affected,
-    coalesce(m.ambiguous, 0) AS ambiguous,
-    coalesce(m.messages, 0) AS messages,
-    coalesce(m.pairs, 0) AS pairs,
+    coalesce(COLUMNS(['loss_affected', 'ambiguous', 'messages', 'pairs']), 0),
     round(m.arrivals / nullif(m.number['reached'], 0), 2) AS per_root,
     m.firsts.min_ns AS first_min_ns,
     m.firsts.median_ns AS first_median_ns,
@@ -153,9 +139,4 @@ LEFT JOIN measured AS m
     AND n.first_topic IS NOT DISTINCT FROM m.first_topic
     AND n.last_topic IS NOT DISTINCT FROM m.last_topic
     AND n.node = m.node
-LEFT JOIN affected AS a
-    ON n.run_id = a.run_id
-    AND n.first_topic IS NOT DISTINCT FROM a.first_topic
-    AND n.last_topic IS NOT DISTINCT FROM a.last_topic
-    AND n.node = a.node
 ORDER BY n.run_id, n.first_topic, n.last_topic, n.node

@@ -80,11 +80,7 @@ measured AS (
 )
 SELECT
     p.run_id,
-    coalesce(m.inputs, 0) AS inputs,
-    coalesce(m.intervals, 0) AS intervals,
-    coalesce(m.unanswered, 0) AS unanswered,
-    coalesce(m.loss_affected, 0) AS loss_affected,
-    coalesce(m.ambiguous, 0) AS ambiguous,
+    coalesce(COLUMNS(['inputs', 'intervals', 'unanswered', 'loss_affected', 'ambiguous']), 0),
     unnest(m.reaction), m.event_mean_ns, m.sink_event, p.is_cut, p.path
 FROM main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p
 LEFT JOIN measured AS m ON p.path_id = m.path_id

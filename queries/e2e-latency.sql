@@ -61,9 +61,6 @@ CREATE OR REPLACE TEMP TABLE path_chain AS
 FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
 
 CREATE OR REPLACE TEMP TABLE path_outcome AS
-SELECT
-    run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
-    reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
     $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain',
     has_calls := $has_calls, has_gaps := $has_gaps, has_states := $has_states
@@ -97,8 +94,7 @@ GROUP BY path_id;
 
 WITH flow AS (
     SELECT
-        run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, latency_ns, status,
-        reason, is_first, is_loss_affected, is_ambiguous,
+        *,
         CASE $case
             WHEN 'first' THEN is_first
             WHEN 'last' THEN is_last
@@ -108,25 +104,22 @@ WITH flow AS (
     FROM path_outcome
 ),
 -- What became of a root is the same in each of its rows, but for gaps in its time.
-root AS (SELECT run_id, path_id, status, reason FROM flow WHERE is_first IS NOT false),
-affected AS (
-    SELECT path_id, count(*) AS number
-    FROM (SELECT DISTINCT path_id, root_kind, root_id FROM flow WHERE is_loss_affected)
-    GROUP BY path_id
-),
 completeness AS (
     SELECT
-        run_id, path_id, count(*) AS roots, histogram(status)::MAP(VARCHAR, BIGINT) AS number,
-        main.counts_text(CASE WHEN status <> 'reached' THEN reason END) AS reasons
-    FROM root
-    GROUP BY run_id, path_id
+        path_id,
+        count(*) FILTER (is_first IS NOT false) AS roots,
+        histogram(status) FILTER (is_first IS NOT false)::MAP(VARCHAR, BIGINT) AS number,
+        main.counts_text(CASE WHEN status <> 'reached' THEN reason END) AS reasons,
+        count(DISTINCT (root_kind, root_id)) FILTER (is_loss_affected) AS loss_affected
+    FROM flow
+    GROUP BY path_id
 ),
 latency AS (
     SELECT
         run_id, path_id,
+        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         count(latency_ns) AS pairs,
         count(*) - count(latency_ns) AS stored,
-        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         any_value(sink_event) AS sink_event,
         main.spread(latency_ns) AS latency,
         -- Of equally long ones the first, and of its arrivals the first.
@@ -147,10 +140,7 @@ SELECT
     coalesce(c.number['not_connected'], 0) AS not_connected,
     coalesce(c.number['unknown'], 0) AS unknown,
     coalesce(c.number['cut_by_recording'], 0) AS cut_by_recording,
-    coalesce(a.number, 0) AS loss_affected,
-    coalesce(l.ambiguous, 0) AS ambiguous,
-    coalesce(l.pairs, 0) AS pairs,
-    coalesce(l.stored, 0) AS stored,
+    coalesce(COLUMNS(['loss_affected', 'ambiguous', 'pairs', 'stored']), 0),
     coalesce(o.number, 0) AS looped,
     unnest(l.latency),
     -l.longest.before_ns AS max_root_ns,
@@ -158,7 +148,6 @@ SELECT
     l.sink_event, p.is_cut, c.reasons, p.path
 FROM named_path AS p
 LEFT JOIN completeness AS c ON p.path_id = c.path_id
-LEFT JOIN affected AS a ON p.path_id = a.path_id
 LEFT JOIN latency AS l ON p.path_id = l.path_id
 LEFT JOIN looped_path AS o ON p.path_id = o.path_id
 ORDER BY p.run_id, p.path, p.path_id

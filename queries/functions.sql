@@ -33,9 +33,6 @@ CREATE OR REPLACE TEMP TABLE path_chain AS
 FROM main.flow_chain($runs, $from, $to);
 
 CREATE OR REPLACE TEMP TABLE function_outcome AS
-SELECT
-    run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns, status,
-    reason, is_first, is_last, is_newest, is_loss_affected, is_ambiguous
 FROM main.end_to_end(
     $runs, $from, $to, 'callback_start', 'callback_end', $start_ns, $end_ns, chains := 'path_chain'
 )
@@ -47,13 +44,10 @@ WHERE coalesce($from, $to, $via, $without) IS NOT NULL
     );
 
 CREATE OR REPLACE TEMP TABLE function_flow AS
-SELECT
-    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
-    is_ambiguous, row_number() OVER (ORDER BY latency_ns DESC, flow_id) AS place
+SELECT *, row_number() OVER (ORDER BY latency_ns DESC, flow_id) AS place
 FROM main.chosen_flow('function_outcome', most_flows := $slowest);
 
 CREATE OR REPLACE TEMP TABLE function_trail AS
-SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
 FROM main.end_to_end_trail('function_flow', $runs, chains := 'path_chain');
 
 -- The place counts from the slowest flow that it is on the way of, or the longest instance.
@@ -95,7 +89,7 @@ sample AS (
                 AND s.at_ns >= $start_ns AND s.at_ns < $end_ns
         END
 ),
-found AS (SELECT * FROM main.function_time('sample')),
+found AS (FROM main.function_time('sample')),
 -- Those with most samples come first.
 placed AS (
     SELECT group_id, row_number() OVER (ORDER BY sum(self_samples) DESC, group_id) AS place

@@ -5,70 +5,42 @@
 -- column: run_id BIGINT      Run
 -- column: object VARCHAR     View that holds the rows
 -- column: row_count BIGINT   Rows
-WITH object AS (
+WITH counted AS (
     SELECT
+        r.run_id,
         unnest([
             'host', 'process', 'thread', 'node', 'publisher', 'subscription', 'timer',
             'service', 'client', 'action_server', 'action_client', 'callback', 'executor',
             'publication', 'take', 'callback_instance', 'request', 'response', 'goal',
             'link_transport', 'link_causal'
         ]) AS object,
-        unnest(range(21)) AS position
-),
-
-counted AS (
-    SELECT 'host' AS object, run_id FROM main.host
-    UNION ALL
-    SELECT 'process' AS object, run_id FROM main.process
-    UNION ALL
-    SELECT 'thread' AS object, run_id FROM main.thread
-    UNION ALL
-    SELECT 'node' AS object, run_id FROM main.node
-    UNION ALL
-    SELECT 'publisher' AS object, run_id FROM main.publisher
-    UNION ALL
-    SELECT 'subscription' AS object, run_id FROM main.subscription
-    UNION ALL
-    SELECT 'timer' AS object, run_id FROM main.timer
-    UNION ALL
-    SELECT 'service' AS object, run_id FROM main.service
-    UNION ALL
-    SELECT 'client' AS object, run_id FROM main.client
-    UNION ALL
-    SELECT 'action_server' AS object, run_id FROM main.action_server
-    UNION ALL
-    SELECT 'action_client' AS object, run_id FROM main.action_client
-    UNION ALL
-    SELECT 'callback' AS object, run_id FROM main.callback
-    UNION ALL
-    SELECT 'executor' AS object, run_id FROM main.executor
-    UNION ALL
-    SELECT 'publication' AS object, run_id FROM main.publication
-    UNION ALL
-    SELECT 'take' AS object, run_id FROM main.take
-    UNION ALL
-    SELECT 'callback_instance' AS object, run_id FROM main.callback_instance
-    UNION ALL
-    SELECT 'request' AS object, run_id FROM main.request
-    UNION ALL
-    SELECT 'response' AS object, run_id FROM main.response
-    UNION ALL
-    SELECT 'goal' AS object, run_id FROM main.goal
-    UNION ALL
-    SELECT 'link_transport' AS object, run_id FROM main.link_transport
-    UNION ALL
-    SELECT 'link_causal' AS object, run_id FROM main.link_causal
-),
-
-found AS (
-    SELECT run_id, object, count(*) AS row_count
-    FROM counted
-    WHERE list_contains($runs, run_id)
-    GROUP BY run_id, object
+        unnest(range(21)) AS position,
+        unnest([
+            (SELECT count(*) FROM main.host AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.process AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.thread AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.node AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.publisher AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.subscription AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.timer AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.service AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.client AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.action_server AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.action_client AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.callback AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.executor AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.publication AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.take AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.callback_instance AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.request AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.response AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.goal AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.link_transport AS o WHERE o.run_id = r.run_id),
+            (SELECT count(*) FROM main.link_causal AS o WHERE o.run_id = r.run_id)
+        ]) AS row_count
+    FROM main.run AS r
+    WHERE list_contains($runs, r.run_id)
 )
-SELECT run.run_id, object.object, coalesce(found.row_count, 0) AS row_count
-FROM main.run
-CROSS JOIN object
-LEFT JOIN found ON run.run_id = found.run_id AND object.object = found.object
-WHERE list_contains($runs, run.run_id)
-ORDER BY run.run_id, object.position
+SELECT run_id, object, row_count
+FROM counted
+ORDER BY run_id, position

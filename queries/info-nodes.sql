@@ -18,35 +18,21 @@
 -- brief: node, process_name, publisher_count, subscription_count, timer_count, service_count,
 --     client_count, action_server_count, action_client_count, pid
 SELECT
-    node.run_id, node.full_name AS node, process.name AS process_name, process.pid,
-    (
-        SELECT count(*)
-        FROM main.publisher
-        WHERE publisher.node_id = node.node_id AND NOT publisher.is_internal
-    ) AS publisher_count,
-    (
-        SELECT count(*)
-        FROM main.subscription
-        WHERE subscription.node_id = node.node_id AND NOT subscription.is_internal
-    ) AS subscription_count,
-    (SELECT count(*) FROM main.timer WHERE timer.node_id = node.node_id) AS timer_count,
-    (
-        SELECT count(*)
-        FROM main.service
-        WHERE service.node_id = node.node_id AND NOT service.is_internal
-    ) AS service_count,
-    (
-        SELECT count(*)
-        FROM main.client
-        WHERE client.node_id = node.node_id AND NOT client.is_internal
-    ) AS client_count,
-    (
-        SELECT count(*) FROM main.action_server WHERE action_server.node_id = node.node_id
-    ) AS action_server_count,
-    (
-        SELECT count(*) FROM main.action_client WHERE action_client.node_id = node.node_id
-    ) AS action_client_count
-FROM main.node
-JOIN main.process ON process.process_id = node.process_id
-WHERE list_contains($runs, node.run_id)
-ORDER BY node.run_id, node.full_name, node.node_id
+    n.run_id, n.full_name AS node, p.name AS process_name, p.pid,
+    (SELECT count(*) FROM main.publisher AS o WHERE o.node_id = n.node_id AND NOT o.is_internal)
+        AS publisher_count,
+    (SELECT count(*) FROM main.subscription AS o WHERE o.node_id = n.node_id AND NOT o.is_internal)
+        AS subscription_count,
+    (SELECT count(*) FROM main.timer AS o WHERE o.node_id = n.node_id) AS timer_count,
+    (SELECT count(*) FROM main.service AS o WHERE o.node_id = n.node_id AND NOT o.is_internal)
+        AS service_count,
+    (SELECT count(*) FROM main.client AS o WHERE o.node_id = n.node_id AND NOT o.is_internal)
+        AS client_count,
+    (SELECT count(*) FROM main.action_server AS o WHERE o.node_id = n.node_id)
+        AS action_server_count,
+    (SELECT count(*) FROM main.action_client AS o WHERE o.node_id = n.node_id)
+        AS action_client_count
+FROM main.node AS n
+JOIN main.process AS p ON n.process_id = p.process_id
+WHERE list_contains($runs, n.run_id)
+ORDER BY n.run_id, n.full_name, n.node_id

@@ -33,13 +33,6 @@ gap AS (
     FROM gap_edge
     GROUP BY run_id, trace_id
 ),
-process_label AS (
-    SELECT
-        p.run_id, p.process_id,
-        printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS label
-    FROM main.process AS p
-    JOIN main.host AS h ON p.host_id = h.host_id
-),
 object AS (
     SELECT process_id, is_inferred FROM main.node
     UNION ALL
@@ -120,9 +113,12 @@ measured AS (
     FROM main.trace AS t
     LEFT JOIN gap AS g ON t.trace_id = g.trace_id
     UNION ALL
-    SELECT l.run_id, 2, 'process', l.label, b.measure, b.affected, b.total, false
+    SELECT
+        p.run_id, 2, 'process', printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname),
+        b.measure, b.affected, b.total, false
     FROM by_process AS b
-    JOIN process_label AS l ON b.process_id = l.process_id
+    JOIN main.process AS p ON b.process_id = p.process_id
+    JOIN main.host AS h ON p.host_id = h.host_id
     UNION ALL
     SELECT
         run_id, 3, 'topic', coalesce(topic_name, '?'), measure, affected, total,

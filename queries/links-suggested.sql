@@ -106,8 +106,7 @@ fired AS (
 ),
 firing AS (
     SELECT
-        publisher_id, output_topic, node_id, subscription_id, callback_instance_id, start_ns,
-        published_ns,
+        *,
         lag(published_ns) OVER (
             PARTITION BY publisher_id ORDER BY published_ns, callback_instance_id
         ) AS emptied_ns
@@ -346,15 +345,14 @@ received AS (
     GROUP BY node_id
 ),
 candidate AS (
-    SELECT node_id, kind, inputs, outputs, evidence, doubt, false AS is_set FROM periodic
-    UNION ALL
-    SELECT node_id, kind, inputs, outputs, evidence, doubt, true FROM partial
-    UNION ALL
-    SELECT node_id, kind, inputs, outputs, evidence, doubt, false FROM independent
-    UNION ALL
-    SELECT node_id, kind, inputs, outputs, evidence, doubt, false FROM kept_by_hand
-    UNION ALL
-    SELECT node_id, kind, inputs, outputs, evidence, doubt, false FROM queued
+    SELECT *, kind IN ('partial_sync', 'approximate_sync') AS is_set
+    FROM (
+        FROM periodic
+        UNION ALL BY NAME FROM partial
+        UNION ALL BY NAME FROM independent
+        UNION ALL BY NAME FROM kept_by_hand
+        UNION ALL BY NAME FROM queued
+    )
 )
 SELECT
     n.run_id, c.kind, n.full_name AS node, c.inputs, c.outputs, c.evidence,

@@ -71,10 +71,7 @@ SELECT
     a.run_id, a.kind, a.source,
     main.node_label(n.full_name, p.name, p.pid) AS node,
     i.topics AS inputs, o.topics AS outputs,
-    coalesce(f.publications, 0) AS publications,
-    coalesce(f.complete, 0) AS complete,
-    coalesce(l.links, 0) AS links,
-    coalesce(l.ambiguous, 0) AS ambiguous,
+    coalesce(COLUMNS(['publications', 'complete', 'links', 'ambiguous']), 0),
     l.median_wait_ns, l.max_wait_ns, a.annotation_id
 FROM main.annotation AS a
 JOIN main.process AS p ON a.process_id = p.process_id

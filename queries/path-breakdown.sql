@@ -41,13 +41,9 @@
 -- zero: total_ns
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE breakdown_flow AS
-SELECT
-    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
-    is_ambiguous
 FROM main.chosen_flow('path_outcome', $case);
 
 CREATE OR REPLACE TEMP TABLE breakdown_trail AS
-SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
 FROM main.end_to_end_trail('breakdown_flow', $runs, chains := 'path_chain');
 
 CREATE OR REPLACE TEMP TABLE breakdown_wait AS

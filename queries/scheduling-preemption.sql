@@ -4,14 +4,11 @@
 --     one again, each has its time. Without kernel traces there are no rows. The longest time comes
 --     first.
 -- grain: one row per thread, priority, and thread that took the CPU from it, with its priority
--- column: run_id BIGINT             Run
--- column: nodes VARCHAR             First two nodes of its process, and how many more; without
---     nodes its name and id
--- column: process VARCHAR           Process name
+-- like: scheduling-wakeup
+-- column: run_id, nodes, process
 -- column: thread VARCHAR            Thread that lost the CPU
 -- column: tid INTEGER               Its thread id
--- column: priority INTEGER          Its priority, as the kernel has it: 0 to 99 real-time, 100 to
---     139 nice -20 to 19
+-- column: priority
 -- column: preempted_by VARCHAR      Thread that had the CPU; of a ROS process its nodes, with the
 --     name of the thread where that is not the one of the process
 -- column: preempted_by_tid INTEGER  Its thread id; of a process without ROS the kernel's number

@@ -6,9 +6,8 @@
 -- variant: measure VARCHAR {callbacks|threads|cpu|preemption|wakeup} = 'callbacks'  What is
 --     measured: the states of callbacks, those of threads, the CPU time of threads of all
 --     processes, who took the CPU from which thread, or how long woken threads waited for one
--- column: run_id BIGINT             Run
--- column: node VARCHAR [node]  Node of the callback
--- column: callback VARCHAR [callback]  What triggers it
+-- like: callbacks-each
+-- column: run_id, node, callback
 -- column: count BIGINT              Callback instances that began in the time window and ended
 -- column: median_ns BIGINT [ns]     Median duration
 -- column: max_ns BIGINT [ns]        Longest duration
@@ -28,8 +27,7 @@
 -- column: preemptions BIGINT        How often the CPU was taken away
 -- column: migrations BIGINT         How often a callback went on on another CPU
 -- column: loss_affected BIGINT      Callback instances during which kernel events were lost
--- column: callback_id BIGINT        Identity of the callback
--- column: is_internal BOOLEAN       Infrastructure of ROS
+-- column: callback_id, is_internal
 -- brief: node, callback, preempted_ns, median_ns, running_median_ns, running_p99_ns, count,
 --     sleeping_ns, runnable_ns, preemptions, max_ns
 -- note: kernel
@@ -42,14 +40,10 @@ WITH measured AS (
         quantile_disc(s.running_ns, [0.5, 0.99]) AS quantiles,
         max(s.running_ns) AS running_max_ns,
         sum(i.end_ns - i.start_ns)::BIGINT AS total_ns,
-        sum(s.running_ns)::BIGINT AS running_ns,
-        sum(s.preempted_ns)::BIGINT AS preempted_ns,
-        sum(s.runnable_ns)::BIGINT AS runnable_ns,
-        sum(s.sleeping_ns)::BIGINT AS sleeping_ns,
-        sum(s.uninterruptible_ns)::BIGINT AS uninterruptible_ns,
-        sum(s.unknown_ns)::BIGINT AS unknown_ns,
-        sum(s.irq_ns)::BIGINT AS irq_ns,
-        sum(s.softirq_ns)::BIGINT AS softirq_ns,
+        sum(COLUMNS([
+            'running_ns', 'preempted_ns', 'runnable_ns', 'sleeping_ns', 'uninterruptible_ns',
+            'unknown_ns', 'irq_ns', 'softirq_ns'
+        ]))::BIGINT,
         sum(s.preemption_count)::BIGINT AS preemptions,
         sum(s.migration_count)::BIGINT AS migrations,
         count(*) FILTER (WHERE s.is_loss_affected) AS loss_affected

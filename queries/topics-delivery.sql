@@ -54,13 +54,9 @@ orphan AS (
 SELECT
     s.run_id, s.topic_name,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
-    coalesce(d.published, 0) AS published,
-    coalesce(d.delivered, 0) AS delivered,
-    coalesce(d.dropped, 0) AS dropped,
-    coalesce(d.lost, 0) AS lost,
-    coalesce(d.not_connected, 0) AS not_connected,
-    coalesce(d.cut_by_recording, 0) AS cut_by_recording,
-    coalesce(d.unknown, 0) AS unknown,
+    coalesce(COLUMNS([
+        'published', 'delivered', 'dropped', 'lost', 'not_connected', 'cut_by_recording', 'unknown'
+    ]), 0),
     100 * delivered / nullif(delivered + dropped + lost, 0) AS delivered_percent,
     100 * lost / nullif(delivered + dropped + lost, 0) AS lost_percent,
     coalesce(o.orphans, 0) AS orphans,

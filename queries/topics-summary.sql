@@ -3,11 +3,8 @@
 --     messages, and how long they took to be taken, in the time window. The variants rate, delivery
 --     and latency say the same of each publisher and each subscription.
 -- grain: one row per topic
--- column: run_id BIGINT               Run
--- column: topic_name VARCHAR [topic]  Topic
--- column: publisher_count BIGINT      Publishers
--- column: subscription_count BIGINT   Subscriptions
--- column: publication_count BIGINT    Messages published
+-- like: topics
+-- column: run_id, topic_name, publisher_count, subscription_count, publication_count
 -- column: rate_hz DOUBLE [Hz]         Publications of all publishers per second, from the first to
 --     the last
 -- column: period_median_ns BIGINT [ns]  Median time from one publication of a publisher to its next
@@ -23,27 +20,12 @@
 -- column: latency_median_ns BIGINT [ns]  Median latency from publication to take
 -- column: latency_p95_ns BIGINT [ns]  95 % of the latencies are at most this
 -- column: latency_max_ns BIGINT [ns]  Longest latency
--- column: is_internal BOOLEAN         ROS uses it for itself
+-- column: is_internal
 -- brief: topic_name, publication_count, rate_hz, period_deviation_ns, dropped, lost, reasons,
 --     latency_median_ns, latency_p95_ns, latency_max_ns, delivered, unknown
 -- answer: delivered, dropped, lost, unknown
 -- note: clocks
-WITH topic AS (
-    SELECT
-        run_id, topic_name,
-        sum(publisher)::BIGINT AS publisher_count,
-        sum(subscription)::BIGINT AS subscription_count,
-        bool_or(is_internal) AS is_internal
-    FROM (
-        SELECT run_id, topic_name, is_internal, 1 AS publisher, 0 AS subscription
-        FROM main.publisher
-        UNION ALL
-        SELECT run_id, topic_name, is_internal, 0, 1 FROM main.subscription
-    )
-    WHERE list_contains($runs, run_id)
-    GROUP BY run_id, topic_name
-),
-published AS (
+WITH published AS (
     SELECT
         b.run_id, p.topic_name, b.publisher_id, b.start_ns,
         b.start_ns - lag(b.start_ns) OVER (
@@ -110,9 +92,10 @@ SELECT
     l.quantiles[1] AS latency_median_ns,
     l.quantiles[2] AS latency_p95_ns,
     l.max_ns AS latency_max_ns, t.is_internal
-FROM topic AS t
+FROM main.topic AS t
 LEFT JOIN rate AS r ON t.run_id = r.run_id AND t.topic_name IS NOT DISTINCT FROM r.topic_name
 LEFT JOIN jitter AS j ON t.run_id = j.run_id AND t.topic_name IS NOT DISTINCT FROM j.topic_name
 LEFT JOIN delivery AS d ON t.run_id = d.run_id AND t.topic_name IS NOT DISTINCT FROM d.topic_name
 LEFT JOIN latency AS l ON t.run_id = l.run_id AND t.topic_name IS NOT DISTINCT FROM l.topic_name
+WHERE list_contains($runs, t.run_id)
 ORDER BY t.run_id, t.topic_name NULLS LAST

@@ -5,13 +5,11 @@
 --     are left out. Where the kernel was traced, it shows when the message arrived, and for how
 --     long the thread waited for a CPU.
 -- grain: one row per callback instance that is not nested in another
+-- like: callbacks-each
 -- param: callback_id BIGINT = NULL  Only instances of this callback_id (query waits lists  them)
 -- param: min_busy_ns BIGINT {0..} = 0  Only waits in which the executor may have been busy for that
 --     long [ns]
--- column: run_id BIGINT             Run
--- column: start_ns BIGINT [epoch ns]  Start of the callback
--- column: node VARCHAR [node]  Node of the callback
--- column: callback VARCHAR [callback]  What triggers it
+-- column: run_id, start_ns, node, callback
 -- column: since VARCHAR             Where the wait begins: 'publication', 'stamp', 'request' or
 --     'timer'; empty: not known
 -- column: wait_ns BIGINT [ns]       From there to the start of the callback
@@ -37,8 +35,7 @@
 -- column: cpu_taken_by VARCHAR      What had the CPU in both, and for how long, the longest first
 -- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
 -- column: callback_instance_id BIGINT  Identity of the callback instance
--- column: callback_id BIGINT        Identity of the callback
--- column: is_internal BOOLEAN       Infrastructure of ROS
+-- column: callback_id, is_internal
 -- slowest: wait_ns
 -- brief: start_ns, node, callback, wait_ns, reason, busy_max_ns, meanwhile, run_queue_ns,
 --     cpu_taken_by, preempted_ns, until_arrival_ns, busy_min_ns, since, rest_max_ns, rest_min_ns,
@@ -46,9 +43,7 @@
 -- note: clocks
 WITH waited AS MATERIALIZED (
     SELECT
-        run_id, callback_instance_id, callback_id, start_ns, since, wait_ns, busy_min_ns,
-        busy_max_ns, blocked_max_ns, held_max_ns, is_loss_affected, meanwhile_callback_ids,
-        meanwhile_ns, until_arrival_ns, run_queue_ns, preempted_ns, cpu_taken_by, cpu_taken_ns,
+        *,
         executor_id IN (
             SELECT executor_id FROM main.executor WHERE kind NOT LIKE 'multi_threaded%'
         ) OR held_max_ns IS NULL AS is_alone

@@ -11,9 +11,8 @@
 --     and period
 -- variant: by VARCHAR {callback|pair|instance} = 'callback'  What a row is: a callback that
 --     waited, with another that ran meanwhile, or one of its waits
--- column: run_id BIGINT             Run
--- column: node VARCHAR [node]  Node of the callback
--- column: callback VARCHAR [callback]  What triggers it
+-- like: callbacks-each
+-- column: run_id, node, callback
 -- column: count BIGINT              Callback instances that began in the time window
 -- column: delayed_min BIGINT        Of these, certainly kept waiting: ready while others ran
 -- column: delayed_max BIGINT        Of these, possibly kept waiting
@@ -42,17 +41,13 @@
 -- column: cpu_taken_by VARCHAR      What had the CPU in both: the three with the largest share
 -- column: unknown BIGINT            Of these, with an unknown start of the wait
 -- column: loss_affected BIGINT      Of these, with a gap of the trace in their wait
--- column: callback_id BIGINT        Identity of the callback
--- column: is_internal BOOLEAN       Infrastructure of ROS
+-- column: callback_id, is_internal
 -- brief: node, callback, busy_worst_ns, wait_median_ns, wait_max_ns, run_queue_worst_ns,
 --     meanwhile, cpu_taken_by, preempted_worst_ns, count, delayed_min, delayed_max,
 --     busy_total_min_ns, busy_total_max_ns
 -- note: clocks
 WITH waited AS MATERIALIZED (
-    SELECT
-        w.run_id, w.callback_instance_id, k.alike_id AS callback_id, w.wait_ns, w.busy_min_ns,
-        w.busy_max_ns, w.held_max_ns, w.is_loss_affected, w.meanwhile_callback_ids, w.meanwhile_ns,
-        w.until_arrival_ns, w.run_queue_ns, w.preempted_ns, w.cpu_taken_by, w.cpu_taken_ns
+    SELECT w.* REPLACE (k.alike_id AS callback_id)
     FROM main.executor_wait_explained($runs) AS w
     JOIN main.callback_alike AS k ON w.callback_id = k.callback_id
     WHERE w.start_ns >= $start_ns AND w.start_ns < $end_ns

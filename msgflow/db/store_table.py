@@ -133,10 +133,7 @@ def _expression(column: StoreColumn) -> str:
     if not column.clock:
         return f"self.{column.name}"
     clock = _clock_alias(column.clock)
-    return (
-        f"derive.corrected_ns(self.{column.name}, {clock}.offset_ns, {clock}.drift_ppb, "
-        f"{clock}.reference_ns) AS {column.name}"
-    )
+    return f"derive.corrected_ns(self.{column.name}, {clock}) AS {column.name}"
 
 
 def _joins(table: StoreTable, way: str) -> Iterator[tuple[str, str, str, str]]:

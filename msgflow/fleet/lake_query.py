@@ -48,7 +48,8 @@ _LISTS = re.compile(
     r"\b(show|describe|summarize|information_schema|duckdb_\w+|pragma_\w+)\b", re.IGNORECASE
 )
 # DuckDB says this of a statement when files have other columns.
-_LACKING = re.compile(r'does not have a column named "(\w+)"')
+# Of one column, and of one among COLUMNS.
+_LACKING = re.compile(r'(?:does not have a column named|Column) "(\w+)"')
 _BUCKETS = "distributed"
 STATEMENTS = Statements(Path(__file__).parent / "sql")
 

@@ -110,10 +110,7 @@ moment AS (
         w.clock_id,
         CASE
             WHEN w.via_id = w.clock_id THEN p.at_ns
-            ELSE derive.recorded_ns(
-                derive.corrected_ns(p.at_ns, v.offset_ns, v.drift_ppb, v.reference_ns),
-                c.offset_ns, c.drift_ppb, c.reference_ns
-            )
+            ELSE derive.recorded_ns(derive.corrected_ns(p.at_ns, v), c)
         END AS at_ns
     FROM way AS w
     JOIN piece AS p ON w.via_id = p.clock_id
@@ -125,10 +122,7 @@ asked AS (
         m.clock_id, m.at_ns, w.via_id,
         CASE
             WHEN w.via_id = m.clock_id THEN m.at_ns
-            ELSE derive.recorded_ns(
-                derive.corrected_ns(m.at_ns, c.offset_ns, c.drift_ppb, c.reference_ns),
-                v.offset_ns, v.drift_ppb, v.reference_ns
-            )
+            ELSE derive.recorded_ns(derive.corrected_ns(m.at_ns, c), v)
         END AS via_at_ns,
         CASE WHEN v.next_clock_id = v.root_id THEN 0 ELSE 2 * derive.clock_drift_limit() END
             AS stretched

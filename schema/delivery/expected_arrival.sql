@@ -35,10 +35,8 @@ SELECT
     coalesce(
         s.end_ns + c.shift_ns,
         CASE
-            WHEN f.reference_clock_id = o.reference_clock_id THEN derive.recorded_ns(
-                derive.corrected_ns(s.end_ns, f.offset_ns, f.drift_ppb, f.reference_ns),
-                o.offset_ns, o.drift_ppb, o.reference_ns
-            )
+            WHEN f.reference_clock_id = o.reference_clock_id
+                THEN derive.recorded_ns(derive.corrected_ns(s.end_ns, f), o)
         END
     ),
     false

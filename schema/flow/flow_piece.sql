@@ -39,9 +39,7 @@ piece AS MATERIALIZED (
 ),
 -- What lasts goes from one piece on to another: both ends of it are boundaries.
 covering AS (
-    SELECT
-        c.position, c.priority, c.activity, c.latest_ns, c.callback_instance_id, c.publication_id,
-        c.from_ns, unnest(range(f.number, l.number + 1)) AS number
+    SELECT c.*, unnest(range(f.number, l.number + 1)) AS number
     FROM clipped AS c
     JOIN piece AS f ON c.position = f.position AND c.from_ns = f.from_ns
     JOIN piece AS l ON c.position = l.position AND c.to_ns = l.to_ns

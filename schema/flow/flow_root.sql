@@ -46,21 +46,16 @@ cause AS (
         CASE WHEN take_id IS NULL THEN caller_id END
     FROM called
 ),
-caused AS (
+root AS (
     SELECT
         c.run_id, c.publication_id, c.publisher_id,
         bool_or(c.is_message) AS is_message,
-        min(c.callback_instance_id) AS callback_instance_id
+        CASE WHEN NOT bool_or(c.is_message) THEN min(c.callback_instance_id) END
+            AS callback_instance_id
     FROM cause AS c
     JOIN store.publisher AS p ON c.publisher_id = p.publisher_id
     WHERE NOT p.is_internal
     GROUP BY c.run_id, c.publication_id, c.publisher_id
-),
-root AS (
-    SELECT
-        run_id, publication_id, publisher_id, is_message,
-        CASE WHEN NOT is_message THEN callback_instance_id END AS callback_instance_id
-    FROM caused
 ),
 way AS (
     SELECT publication_id, caller_id, min(route) AS route

@@ -23,7 +23,7 @@ place AS (
 created AS (
     SELECT
         s.run_id, s.subscription_id, p.clock_id, p.reference_clock_id, p.uncertainty_ns,
-        derive.corrected_ns(s.created_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS created_ns
+        derive.corrected_ns(s.created_ns, p) AS created_ns
     FROM store.subscription AS s
     JOIN place AS p ON s.process_id = p.process_id
     WHERE s.topic_name IS DISTINCT FROM '/parameter_events'
@@ -33,12 +33,12 @@ latest AS (SELECT run_id, max(created_ns) AS created_ns FROM created GROUP BY ru
 sent AS (
     SELECT
         b.publication_id, p.clock_id, p.reference_clock_id, p.uncertainty_ns,
-        derive.corrected_ns(b.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS end_ns
+        derive.corrected_ns(b.end_ns, p) AS end_ns
     FROM store.publication AS b
     JOIN place AS p ON b.process_id = p.process_id
     JOIN latest AS n
         ON b.run_id = n.run_id
-        AND derive.corrected_ns(b.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) < n.created_ns
+        AND derive.corrected_ns(b.end_ns, p) < n.created_ns
 )
 SELECT l.run_id, l.take_id, s.created_ns, s.created_ns - b.end_ns AS stored_ns
 FROM store.link_transport AS l

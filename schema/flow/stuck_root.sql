@@ -140,8 +140,8 @@ SELECT
         false
     ) AS is_cut,
     CASE
-        WHEN s.publisher_id IS NULL OR s.publication_id IS NULL THEN
-            derive.corrected_ns(p.last_seen_ns, k.offset_ns, k.drift_ppb, k.reference_ns)
+        WHEN s.publisher_id IS NULL OR s.publication_id IS NULL
+            THEN derive.corrected_ns(p.last_seen_ns, k)
     END AS recorded_until_ns
 FROM stuck AS s
 LEFT JOIN store.publication AS b ON s.publication_id = b.publication_id

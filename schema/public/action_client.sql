@@ -13,8 +13,7 @@
 -- column: created_ns BIGINT [epoch ns]  When it was created
 -- column: goal_count BIGINT  Goals that it sent; NULL: requests have no events in the traces of its
 --     host (before Kilted)
-WITH endpoint AS MATERIALIZED (FROM derive.action_endpoint),
-sent AS (
+WITH sent AS (
     SELECT client_id, count(DISTINCT sequence_number) AS number
     FROM store.request
     GROUP BY client_id
@@ -26,6 +25,6 @@ SELECT
     c.created_ns,
     coalesce(q.number, CASE WHEN a.process_id IN (FROM derive.call_traced) THEN 0 END)
         AS goal_count
-FROM derive.action_object('endpoint', 'client', 'subscription') AS a
+FROM derive.action_object('client', 'subscription') AS a
 JOIN main.client AS c ON a.goal_object_id = c.client_id
 LEFT JOIN sent AS q ON a.goal_object_id = q.client_id

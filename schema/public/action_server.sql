@@ -15,8 +15,7 @@
 --     host (before Kilted)
 -- column: feedback_count BIGINT  Feedback messages that it published, of all goals
 -- column: status_count BIGINT  Status messages that it published
-WITH endpoint AS MATERIALIZED (FROM derive.action_endpoint),
-taken AS (
+WITH taken AS (
     SELECT service_id, count(*) AS number
     FROM store.request
     WHERE taken_ns IS NOT NULL
@@ -25,7 +24,7 @@ taken AS (
 published AS (
     SELECT publisher_id, count(*) AS number
     FROM store.publication
-    WHERE publisher_id IN (SELECT object_id FROM endpoint WHERE kind = 'publisher')
+    WHERE publisher_id IN (SELECT object_id FROM derive.action_endpoint WHERE kind = 'publisher')
     GROUP BY publisher_id
 )
 SELECT
@@ -37,7 +36,7 @@ SELECT
         AS goal_count,
     coalesce(f.number, 0) AS feedback_count,
     coalesce(t.number, 0) AS status_count
-FROM derive.action_object('endpoint', 'service', 'publisher') AS a
+FROM derive.action_object('service', 'publisher') AS a
 JOIN main.service AS s ON a.goal_object_id = s.service_id
 LEFT JOIN taken AS q ON a.goal_object_id = q.service_id
 LEFT JOIN published AS f ON a.feedback_object_id = f.publisher_id

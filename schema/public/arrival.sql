@@ -34,18 +34,18 @@ done AS (
     UNION ALL
     SELECT thread_id, start_ns FROM main.publication
 ),
-taken AS (
+taken AS NOT MATERIALIZED (
     SELECT
         l.run_id, l.take_id, l.publication_id, t.thread_id, t.taken_ns, b.start_ns, b.end_ns,
         b.thread_id AS publishing_thread_id
     FROM main.link_transport AS l
     JOIN main.take AS t ON l.take_id = t.take_id
     JOIN main.publication AS b ON l.publication_id = b.publication_id
-    WHERE l.latency_ns IS NOT NULL AND t.thread_id IN (SELECT thread_id FROM main.thread_state)
+    WHERE l.latency_ns IS NOT NULL
 ),
 woken AS (
     SELECT k.*, w.at_ns AS arrived_ns, w.waker_kind, w.waker_thread_id, w.waker_other_thread_id
-    FROM taken AS k
+    FROM (FROM taken WHERE thread_id IN (SELECT thread_id FROM main.thread_state)) AS k
     ASOF JOIN waking AS w ON k.thread_id = w.thread_id AND k.taken_ns >= w.at_ns
     WHERE w.at_ns >= k.start_ns AND w.waker_kind IS NOT NULL
 ),
@@ -85,14 +85,11 @@ by_waking AS MATERIALIZED (
 ),
 heard AS (
     SELECT
-        l.run_id, l.take_id, l.publication_id, t.taken_ns - d.waited_ns AS arrived_ns, b.end_ns,
+        k.run_id, k.take_id, k.publication_id, k.taken_ns - d.waited_ns AS arrived_ns, k.end_ns,
         d.waited_ns, NOT d.is_ambiguous AS is_exact
     FROM main.data_arrival AS d
-    JOIN main.link_transport AS l ON d.take_id = l.take_id
-    JOIN main.take AS t ON d.take_id = t.take_id
-    JOIN main.publication AS b ON l.publication_id = b.publication_id
+    JOIN taken AS k ON d.take_id = k.take_id
     ANTI JOIN (SELECT take_id FROM by_waking WHERE is_exact) AS w ON d.take_id = w.take_id
-    WHERE l.latency_ns IS NOT NULL
 )
 SELECT
     run_id, take_id, publication_id, arrived_ns, waker_kind, waker_thread_id, waker_name, is_exact,

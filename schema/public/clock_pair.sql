@@ -13,8 +13,7 @@
 WITH way AS (
     SELECT
         w.run_id, w.from_clock_id, w.to_clock_id, w.is_packet,
-        derive.corrected_ns(w.received_ns, t.offset_ns, t.drift_ppb, t.reference_ns)
-        - derive.corrected_ns(w.sent_ns, f.offset_ns, f.drift_ppb, f.reference_ns) AS way_ns
+        derive.corrected_ns(w.received_ns, t) - derive.corrected_ns(w.sent_ns, f) AS way_ns
     FROM derive.clock_way AS w
     JOIN store.clock AS f ON w.from_clock_id = f.clock_id
     JOIN store.clock AS t ON w.to_clock_id = t.clock_id

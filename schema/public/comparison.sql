@@ -155,9 +155,7 @@ side AS (
         AND derive.known_word('wanted_case', wanted_case, ['first', 'last', 'newest', 'every_pair'])
 ),
 sided AS MATERIALIZED (
-    SELECT
-        s.side, t.subject, t.at_ns, t.id, t.value_ns, t.is_unit, t.is_complete,
-        t.is_loss_affected, t.is_ambiguous, t.is_cut
+    SELECT s.side, t.*
     FROM thing AS t
     JOIN side AS s ON t.run_id = s.run_id
     WHERE t.at_ns >= s.start_ns AND t.at_ns < s.end_ns AND (internal OR NOT t.is_internal)
@@ -234,9 +232,7 @@ paired AS (
 ),
 judged AS (
     SELECT
-        p.subject, p.statistic, p.a_ns, p.b_ns, p.a_count, p.b_count, p.a_independent,
-        p.b_independent, p.a_share, p.b_share, p.a_loss_affected, p.b_loss_affected, p.a_ambiguous,
-        p.b_ambiguous, p.a_warm_up_ns, p.b_warm_up_ns, p.is_cut,
+        p.*,
         CASE
             WHEN p.a_count = 0 AND p.b_count = 0 THEN 'too few values'
             WHEN p.b_count = 0 THEN 'only in A'

@@ -26,9 +26,6 @@ CREATE OR REPLACE MACRO main.critical_path(
     path_ids := NULL, flow_case := 'first'
 ) AS TABLE
 WITH flow_part AS MATERIALIZED (
-    SELECT
-        flow_id, run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, position, part,
-        from_ns, to_ns, duration_ns, callback_instance_id, publication_id
     FROM main.end_to_end_part(
         runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
         flow_case, sink_take_id := sink_take_id, max_depth := max_depth, max_paths := max_paths,

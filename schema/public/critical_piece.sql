@@ -3,6 +3,7 @@
 --     services in a callback (main.waited_call) by what the service did. Where the kernel was
 --     traced, what a thread did is divided into its states (main.schedule_piece).
 -- grain: one row per piece of a flow
+-- like: main.end_to_end_part, main.schedule_piece
 -- param: parts VARCHAR  Name of the rows of main.end_to_end_part: a table, or a part of the query
 -- param: runs BIGINT[]  Runs that they are of
 -- param: waits VARCHAR = 'wait_here'  Name of a table of when inputs became ready, by the clocks of
@@ -10,27 +11,20 @@
 -- param: has_kernel BOOLEAN = true  A kernel trace was read; false: nothing is looked up in it
 -- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
 -- param: has_teams BOOLEAN = true  Executors have several threads; false: each has one
--- column: run_id BIGINT  Run
--- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
--- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
--- column: root_id BIGINT  Identity of the root
--- column: take_id BIGINT  Take at the end of the path
--- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: run_id, path_id, root_kind, root_id, take_id, latency_ns
 -- column: flow_rank BIGINT  Number of the flow, the longest first
 -- column: hop BIGINT  Number of the message on the path that it belongs or leads to
--- column: position BIGINT  Order within the flow, from 1
+-- column: position
 -- column: part VARCHAR  Part of the flow, as in main.end_to_end_part
 -- column: activity VARCHAR  What happened: the part itself; up to a take 'network_or_idle',
 --     'executor_busy' (it ran something else), 'all_threads_busy', 'blocked' (a callback ran that
 --     excludes the waiting one) or 'undecided' (nothing shows when the message arrived); in a cache
 --     'timer' (not due yet), 'unpublished' (the message that was waited for), or a part of that
 --     message's own flow
--- column: from_ns BIGINT [epoch ns]  Begin
--- column: to_ns BIGINT [epoch ns]  End
--- column: duration_ns BIGINT [ns]  to_ns - from_ns
+-- column: from_ns, to_ns, duration_ns
 -- column: is_certain BOOLEAN  For 'executor_busy', 'all_threads_busy' and 'blocked': what waited
 --     was ready by then; false: it may have arrived meanwhile. NULL for others
--- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
+-- column: callback_instance_id
 -- column: publication_id BIGINT  Message that is published, under way or waited for
 -- column: state VARCHAR  State of the thread, as in main.schedule_piece; NULL: not traced by the
 --     kernel, or no thread's doing
@@ -39,20 +33,16 @@
 -- column: priority INTEGER  Its priority, as the kernel has it: 0 to 99 real-time, 100 to 139 nice
 -- column: by_kind VARCHAR  What took the CPU, or ended the sleep: 'thread', 'timer', 'interrupt' or
 --     'softirq'. NULL: not known, or the state needs none
--- column: by_thread_id BIGINT  That thread, of a ROS process
--- column: by_other_thread_id BIGINT  That thread, of another process
--- column: by_priority INTEGER  Its priority; known for what took the CPU
+-- column: by_thread_id, by_other_thread_id, by_priority
 -- column: request_id BIGINT  Request whose response the callback of the part waits for
 CREATE OR REPLACE MACRO main.critical_piece(
     parts, runs, waits := 'wait_here', has_kernel := true, has_calls := true, has_teams := true
 ) AS TABLE
 WITH RECURSIVE given AS MATERIALIZED (
     SELECT
-        run_id, path_id, root_kind, root_id, take_id, latency_ns, hop, part, from_ns, to_ns,
-        callback_instance_id, publication_id,
-        dense_rank() OVER (ORDER BY latency_ns DESC, flow_id) AS flow_rank,
         -- Here positions go on from flow to flow.
-        row_number() OVER (ORDER BY latency_ns DESC, flow_id, position) AS position
+        * REPLACE (row_number() OVER (ORDER BY latency_ns DESC, flow_id, position) AS position),
+        dense_rank() OVER (ORDER BY latency_ns DESC, flow_id) AS flow_rank
     FROM query_table(parts)
 ),
 -- What a server did lies within its call, though its clock or a late event may say otherwise. Of
@@ -153,29 +143,21 @@ waited AS MATERIALIZED (
 ),
 wait_here AS NOT MATERIALIZED (FROM derive.callback_ready('waited')),
 ready AS MATERIALIZED (
-    SELECT
-        run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
-        earliest_ns, latest_ns, start_ns, picked_ns, thread_count, previous_wait_end_ns,
-        wait_start_ns, is_loss_affected
     FROM query_table(waits)
     WHERE callback_instance_id IN (SELECT callback_instance_id FROM waiting)
 ),
 wait AS MATERIALIZED (
     SELECT
         r.callback_instance_id, r.executor_id, r.thread_id, r.callback_id, r.since,
-        derive.corrected_ns(r.origin_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS origin_ns,
-        derive.corrected_ns(
-            coalesce(r.earliest_ns, r.latest_ns), c.offset_ns, c.drift_ppb, c.reference_ns
-        ) AS earliest_ns,
-        derive.corrected_ns(r.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latest_ns,
-        derive.corrected_ns(r.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
+        derive.corrected_ns(r.origin_ns, c) AS origin_ns,
+        derive.corrected_ns(coalesce(r.earliest_ns, r.latest_ns), c) AS earliest_ns,
+        derive.corrected_ns(r.latest_ns, c) AS latest_ns,
+        derive.corrected_ns(r.start_ns, c) AS start_ns,
         r.earliest_ns IS NOT NULL AS is_bounded,
-        CASE WHEN r.thread_count = 1 AND NOT r.is_loss_affected THEN derive.corrected_ns(
-            greatest(r.earliest_ns, r.previous_wait_end_ns),
-            c.offset_ns, c.drift_ppb, c.reference_ns
-        ) END AS away_ns,
-        derive.corrected_ns(r.wait_start_ns, c.offset_ns, c.drift_ppb, c.reference_ns)
-            AS back_ns
+        CASE WHEN r.thread_count = 1 AND NOT r.is_loss_affected
+            THEN derive.corrected_ns(greatest(r.earliest_ns, r.previous_wait_end_ns), c) END
+            AS away_ns,
+        derive.corrected_ns(r.wait_start_ns, c) AS back_ns
     FROM ready AS r
     JOIN store.thread AS t ON r.thread_id = t.thread_id
     JOIN derive.process_clock AS c ON t.process_id = c.process_id
@@ -247,8 +229,8 @@ unserved AS (
 full_house AS (
     SELECT
         b.executor_id,
-        derive.corrected_ns(b.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
-        derive.corrected_ns(b.end_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS end_ns
+        derive.corrected_ns(b.start_ns, c) AS start_ns,
+        derive.corrected_ns(b.end_ns, c) AS end_ns
     FROM derive.executor_full AS b
     JOIN (SELECT DISTINCT executor_id, process_id FROM meanwhile) AS p
         ON b.executor_id = p.executor_id
@@ -287,9 +269,9 @@ occupied AS (
     UNION ALL
     SELECT
         u.callback_instance_id, 3, 'all_threads_busy',
-        derive.corrected_ns(u.from_ns, c.offset_ns, c.drift_ppb, c.reference_ns),
-        derive.corrected_ns(u.to_ns, c.offset_ns, c.drift_ppb, c.reference_ns),
-        derive.corrected_ns(u.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns),
+        derive.corrected_ns(u.from_ns, c),
+        derive.corrected_ns(u.to_ns, c),
+        derive.corrected_ns(u.latest_ns, c),
         u.callback_instance_id
     FROM unserved AS u
     JOIN store.thread AS t ON u.thread_id = t.thread_id
@@ -386,8 +368,7 @@ named AS (
 -- Neighbours that are the same thing become one.
 numbered AS (
     SELECT
-        run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, part, position,
-        from_ns, to_ns, activity, is_certain, callback_instance_id, publication_id, request_id,
+        *,
         row_number() OVER (PARTITION BY position ORDER BY from_ns)
         - row_number() OVER (
             PARTITION BY position, activity, is_certain, callback_instance_id, publication_id
@@ -440,34 +421,15 @@ interval AS MATERIALIZED (
         AND (w.request_id IS NULL OR w.thread_id IS NOT NULL)
 )
 SELECT
-    w.run_id,
-    w.path_id,
-    w.root_kind,
-    w.root_id,
-    w.take_id,
-    w.latency_ns,
-    w.flow_rank,
-    w.hop,
-    row_number() OVER (
-        PARTITION BY w.flow_rank ORDER BY w.interval_id, s.from_ns
-    ) AS position,
-    w.part,
-    w.activity,
+    w.run_id, w.path_id, w.root_kind, w.root_id, w.take_id, w.latency_ns, w.flow_rank, w.hop,
+    row_number() OVER (PARTITION BY w.flow_rank ORDER BY w.interval_id, s.from_ns) AS position,
+    w.part, w.activity,
     coalesce(s.from_ns, w.from_ns) AS from_ns,
     coalesce(s.to_ns, w.to_ns) AS to_ns,
     coalesce(s.to_ns - s.from_ns, w.duration_ns) AS duration_ns,
-    w.is_certain,
-    w.callback_instance_id,
-    w.publication_id,
-    s.state,
-    s.wakers,
-    s.thread_id AS state_thread_id,
-    s.priority,
-    s.by_kind,
-    s.by_thread_id,
-    s.by_other_thread_id,
-    s.by_priority,
-    w.request_id
+    w.is_certain, w.callback_instance_id, w.publication_id, s.state, s.wakers,
+    s.thread_id AS state_thread_id, s.priority, s.by_kind, s.by_thread_id, s.by_other_thread_id,
+    s.by_priority, w.request_id
 FROM whole AS w
 LEFT JOIN (FROM main.schedule_piece('interval', runs) WHERE has_kernel) AS s
     ON w.interval_id = s.interval_id AND s.state IS NOT NULL

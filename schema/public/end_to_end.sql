@@ -8,7 +8,7 @@
 --     recorded for longer than any flow of the path took. It also cuts a root whose message has an
 --     unknown status where no earlier or no later message passed the step.
 -- grain: one row per path, root and take at the sink; one per path and root that did not reach it
--- like: main.flow_chain
+-- like: main.flow_chain, main.end_to_end_between
 -- param: runs, from_topic, to_topic
 -- param: from_event VARCHAR = 'callback_start'  Event that starts the clock: 'callback_start' or
 --     'publish'; others are an error
@@ -25,13 +25,11 @@
 -- param: has_states BOOLEAN = true  Nodes are managed; false: no state of one is looked up
 -- column: run_id
 -- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
--- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
--- column: root_id BIGINT  Identity of the root
--- column: root_ns BIGINT [epoch ns]  Start of the root
+-- column: root_kind, root_id, root_ns
 -- column: take_id BIGINT  Take at the end of the path; NULL: not reached
 -- column: sink_event VARCHAR  Event that ended the flow: to_event, or 'take' where the sink never
 --     shows a callback
--- column: sink_ns BIGINT [epoch ns]  End of the flow
+-- column: sink_ns
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end; NULL: it did not arrive,
 --     or a message on its way was stored (main.link_transport)
 -- column: status VARCHAR  'reached'; 'superseded' (a newer input took its place in a cache);
@@ -40,9 +38,7 @@
 -- column: reason VARCHAR  Why it did not arrive: 'no_output' (a callback ended without any),
 --     'node_inactive' (a managed node), 'not_published' (one or the other), 'superseded',
 --     'callback_not_finished', or the reason of main.stat_delivery
--- column: is_first BOOLEAN  First arrival of the root; NULL: it did not arrive
--- column: is_last BOOLEAN  Last arrival of the root; NULL: it did not arrive
--- column: is_newest BOOLEAN  Newest root of the arrival; NULL: it did not arrive
+-- column: is_first, is_last, is_newest
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time, from the root to the end;
 --     if it did not arrive, as long as the longest flow of the path took
 -- column: is_ambiguous BOOLEAN  It passes a link that may be another one (a candidate_count above
@@ -54,15 +50,9 @@ CREATE OR REPLACE MACRO main.end_to_end(
     has_states := true
 ) AS TABLE
 WITH RECURSIVE chain_here AS MATERIALIZED (
-    SELECT
-        run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
-        first_publisher_id, first_route, route, is_cached, is_path
     FROM main.flow_chain(runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths)
 ),
 chain AS NOT MATERIALIZED (
-    SELECT
-        run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
-        first_publisher_id, first_route, route, is_cached, is_path
     FROM query_table(chains)
     WHERE derive.known_word('from_event', from_event, ['callback_start', 'publish'])
         AND derive.known_word('to_event', to_event, ['take', 'callback_start', 'callback_end'])
@@ -75,10 +65,7 @@ lineage (path_id, prefix_id, depth, parent_path_id) AS (
     JOIN chain AS c ON l.parent_path_id = c.path_id
 ),
 path AS MATERIALIZED (
-    SELECT
-        run_id, path_id, parent_path_id, depth, publisher_id, subscription_id,
-        first_publisher_id, first_route, route, is_cached, is_path,
-        dense_rank() OVER (ORDER BY publisher_id, subscription_id, route) AS way_id
+    SELECT *, dense_rank() OVER (ORDER BY publisher_id, subscription_id, route) AS way_id
     FROM chain
     WHERE path_id IN (SELECT prefix_id FROM lineage)
 ),
@@ -175,11 +162,7 @@ pair AS MATERIALIZED (
         END AS sink_ns
     FROM arrival AS a
     JOIN sink AS k ON a.path_id = k.path_id
-    WHERE CASE k.sink_event
-        WHEN 'take' THEN a.taken_ns
-        WHEN 'callback_start' THEN a.start_ns
-        ELSE a.end_ns
-    END IS NOT NULL
+    WHERE sink_ns IS NOT NULL
 ),
 expected AS MATERIALIZED (
     SELECT

@@ -28,9 +28,6 @@ CREATE OR REPLACE MACRO main.end_to_end_flow(
     most_flows := NULL, at_quantile := NULL, path_ids := NULL
 ) AS TABLE
 WITH outcome AS NOT MATERIALIZED (
-    SELECT
-        run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
-        status, is_first, is_last, is_newest, is_ambiguous
     FROM main.end_to_end(
         runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
         max_depth := max_depth, max_paths := max_paths

@@ -34,9 +34,6 @@ CREATE OR REPLACE MACRO main.end_to_end_part(
     most_flows := NULL, at_quantile := NULL, path_ids := NULL
 ) AS TABLE
 WITH flow AS MATERIALIZED (
-    SELECT
-        flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns,
-        latency_ns
     FROM main.end_to_end_flow(
         runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
         flow_case, sink_take_id := sink_take_id, max_depth := max_depth, max_paths := max_paths,
@@ -44,7 +41,6 @@ WITH flow AS MATERIALIZED (
     )
 ),
 trail AS MATERIALIZED (
-    SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
     FROM main.end_to_end_trail(
         'flow', runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     )

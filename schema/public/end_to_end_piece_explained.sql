@@ -21,20 +21,9 @@
 CREATE OR REPLACE MACRO main.end_to_end_piece_explained(
     flows, trail, callbacks, runs, has_turns := true
 ) AS TABLE
-WITH RECURSIVE flow AS NOT MATERIALIZED (
-    SELECT
-        flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns,
-        latency_ns
-    FROM query_table(flows)
-),
-passed AS NOT MATERIALIZED (
-    SELECT flow_id, hop, take_id, publication_id, previous_take_id, next_take_id
-    FROM query_table(trail)
-),
-callback AS NOT MATERIALIZED (
-    SELECT callback_instance_id, callback_id, take_id, start_ns, end_ns, busy_min_ns, busy_max_ns
-    FROM query_table(callbacks)
-),
+WITH RECURSIVE flow AS NOT MATERIALIZED (FROM query_table(flows)),
+passed AS NOT MATERIALIZED (FROM query_table(trail)),
+callback AS NOT MATERIALIZED (FROM query_table(callbacks)),
 -- Publications that were not caused directly by the callback instance by which a flow came in: what
 -- caused them at the end of the calls; where nothing was called, that callback instance itself.
 roundabout AS MATERIALIZED (
@@ -288,8 +277,9 @@ begun AS (
 ),
 part AS (
     SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, parts,
-        is_turning, until_ns, unnest(moments) AS moment, unnest(moments[2:] || [NULL]) AS next,
+        *,
+        unnest(moments) AS moment,
+        unnest(moments[2:] || [NULL]) AS next,
         unnest(range(1, len(moments) + 1)) AS number
     FROM begun
 )

@@ -16,11 +16,8 @@ CREATE OR REPLACE MACRO main.end_to_end_trail(
     flows, runs, from_topic := NULL, to_topic := NULL, max_depth := 32, max_paths := 1000,
     chains := 'chain_here'
 ) AS TABLE
-WITH RECURSIVE flow AS NOT MATERIALIZED (
-    SELECT flow_id, path_id, root_kind, root_id, take_id FROM query_table(flows)
-),
+WITH RECURSIVE flow AS NOT MATERIALIZED (FROM query_table(flows)),
 chain_here AS MATERIALIZED (
-    SELECT path_id, parent_path_id, depth, publisher_id, subscription_id, route
     FROM main.flow_chain(runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths)
 ),
 chain AS NOT MATERIALIZED (FROM query_table(chains)),

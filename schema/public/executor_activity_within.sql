@@ -2,17 +2,15 @@
 --     selected from all. What began before, and has no end since a gap follows, is among them only
 --     if the gap ends in the window or later.
 -- grain: one row per interval of a thread in which nothing changed
--- like: main.executor_activity
--- param: runs BIGINT[]  Runs to look at; NULL: all
--- param: window_start_ns BIGINT  Begin of the window, epoch ns; NULL: from the first event
--- param: window_end_ns BIGINT  End of the window, epoch ns, exclusive; NULL: to the last event
+-- like: main.executor_activity, main.executor_pause
+-- param: runs, window_start_ns, window_end_ns
 -- column: run_id, executor_id, thread_id, activity, start_ns, end_ns, callback_instance_id
 CREATE OR REPLACE MACRO main.executor_activity_within(runs, window_start_ns, window_end_ns) AS TABLE
 WITH activity AS (
     SELECT
         a.run_id, a.executor_id, a.thread_id, a.activity,
-        derive.corrected_ns(a.start_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS start_ns,
-        derive.corrected_ns(a.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS end_ns,
+        derive.corrected_ns(a.start_ns, p) AS start_ns,
+        derive.corrected_ns(a.end_ns, p) AS end_ns,
         a.callback_instance_id
     FROM derive.thread_activity(runs, window_start_ns, window_end_ns) AS a
     JOIN store.thread AS t ON a.thread_id = t.thread_id

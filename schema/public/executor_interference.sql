@@ -12,8 +12,5 @@
 --     is unknown)
 -- column: certain_ns BIGINT [ns]  Overlap from latest_ns of the wait on
 WITH executor AS (SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size),
-ready AS (
-    SELECT run_id, executor_id, callback_instance_id, earliest_ns, latest_ns, start_ns
-    FROM derive.callback_ready('executor')
-)
+ready AS (FROM derive.callback_ready('executor'))
 FROM derive.executor_meanwhile('ready')

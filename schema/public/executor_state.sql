@@ -10,8 +10,8 @@
 -- column: callback_instance_id
 SELECT
     s.run_id, s.executor_id, s.thread_id, s.state,
-    derive.corrected_ns(s.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
-    derive.corrected_ns(s.end_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS end_ns,
+    derive.corrected_ns(s.start_ns, c) AS start_ns,
+    derive.corrected_ns(s.end_ns, c) AS end_ns,
     s.callback_instance_id
 FROM derive.executor_interval AS s
 JOIN store.thread AS t ON s.thread_id = t.thread_id

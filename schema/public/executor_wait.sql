@@ -30,13 +30,7 @@
 --     busy_max_ns. Of an executor of one thread: the time between two waits for which it ran no
 --     callback, if that is a millisecond or more. NULL: not known, or less
 WITH executor AS (SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size),
-ready AS (
-    SELECT
-        run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
-        earliest_ns, latest_ns, start_ns, thread_count, picked_ns, wait_start_ns, wait_end_ns,
-        wait_before_ns, previous_wait_end_ns, is_loss_affected
-    FROM derive.callback_ready('executor')
-)
+ready AS (FROM derive.callback_ready('executor'))
 SELECT
     run_id, callback_instance_id, executor_id, thread_id, callback_id, since, origin_ns,
     earliest_ns, latest_ns, start_ns, wait_ns, busy_min_ns, busy_max_ns, blocked_max_ns, idle_ns,

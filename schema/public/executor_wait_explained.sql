@@ -3,14 +3,11 @@
 --     at once take hardly longer than one of them. Where a kernel trace or CARET shows exactly
 --     when a message arrived (main.arrival), it was ready then: the bounds are one.
 -- grain: one row per callback instance that is not nested in another
--- like: main.executor_wait
+-- like: main.executor_wait, main.critical_piece
 -- param: runs BIGINT[]  Runs to look at
 -- param: arrivals VARCHAR = 'arrival_here'  Name of a table with take_id, until_arrival_ns,
 --     run_queue_ns and executor_ns of the exact rows of main.arrival, where there is one
--- param: waits VARCHAR = 'wait_here'  Name of a table of when inputs became ready, by the clocks of
---     the executors, where there is one
--- param: has_kernel BOOLEAN = true  A kernel trace was read; false: nothing is looked up in it
--- param: has_teams BOOLEAN = true  Executors have several threads; false: each has one
+-- param: waits, has_kernel, has_teams
 -- column: run_id, callback_instance_id, executor_id, thread_id, callback_id, since, origin_ns,
 --     earliest_ns, latest_ns, start_ns, wait_ns, busy_min_ns, busy_max_ns, blocked_max_ns, idle_ns,
 --     is_loss_affected, held_max_ns
@@ -37,7 +34,6 @@ WITH executor AS (
     WHERE list_contains(runs, run_id)
 ),
 arrival_here AS MATERIALIZED (
-    SELECT take_id, until_arrival_ns, run_queue_ns, executor_ns
     FROM main.arrival
     WHERE list_contains(runs, run_id) AND is_exact AND executor_ns IS NOT NULL
 ),

@@ -62,8 +62,7 @@ place AS (
 ),
 useful AS MATERIALIZED (
     SELECT
-        h.run_id, h.from_subscription_id, h.route, h.publisher_id, h.subscription_id,
-        h.is_cached, h.is_start, h.is_last, l.place, l.nowhere,
+        h.*, l.place, l.nowhere,
         row_number() OVER (
             ORDER BY
                 h.run_id, h.from_subscription_id, h.publisher_id, h.subscription_id, h.route
@@ -191,7 +190,7 @@ limited AS (
 ),
 ranked AS (
     SELECT
-        run_id, path_id, parent_path_id, depth, first_hop_id, hop_id, is_candidate, is_cut,
+        *,
         row_number() OVER (PARTITION BY run_id, is_candidate ORDER BY depth, path_id) AS path_number
     FROM limited
 )

@@ -23,9 +23,6 @@ CREATE OR REPLACE MACRO main.flow_path(
     only_paths := false, chains := 'chain_here'
 ) AS TABLE
 WITH RECURSIVE chain_here AS MATERIALIZED (
-    SELECT
-        run_id, path_id, parent_path_id, depth, publisher_id, subscription_id, route, is_cached,
-        is_path, is_cut
     FROM main.flow_chain(runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths)
 ),
 chain AS NOT MATERIALIZED (FROM query_table(chains)),

@@ -43,17 +43,16 @@
 -- column: latency_ns BIGINT [ns]  From sending it to the take of its result, on the client's clock
 -- column: is_loss_affected BOOLEAN  A gap of the client's host or the server's lies between these
 --     moments
-WITH endpoint AS MATERIALIZED (FROM derive.action_endpoint),
-server AS MATERIALIZED (
+WITH server AS MATERIALIZED (
     SELECT
         *, goal_object_id AS action_server_id, cancel_object_id AS cancel_service_id,
         result_object_id AS result_service_id, feedback_object_id AS feedback_publisher_id,
         status_object_id AS status_publisher_id
-    FROM derive.action_object('endpoint', 'service', 'publisher')
+    FROM derive.action_object('service', 'publisher')
 ),
 client AS MATERIALIZED (
     SELECT *, goal_object_id AS action_client_id, result_object_id AS result_client_id
-    FROM derive.action_object('endpoint', 'client', 'subscription')
+    FROM derive.action_object('client', 'subscription')
 ),
 answered AS MATERIALIZED (FROM derive.goal_answer('server')),
 request AS MATERIALIZED (FROM derive.goal_request('server', 'client', 'answered')),
@@ -75,11 +74,14 @@ result AS (
 possible AS (
     SELECT goal_id, any_value(candidate_count) AS candidate_count FROM paired GROUP BY goal_id
 ),
+-- Which goal feedback is of is not in the trace.
 told AS (
-    SELECT f.goal_id, count(*) AS number, min(b.start_ns) AS first_ns, max(b.start_ns) AS last_ns
-    FROM derive.goal_feedback('server', 'alone') AS f
+    SELECT a.goal_id, count(*) AS number, min(b.start_ns) AS first_ns, max(b.start_ns) AS last_ns
+    FROM store.publication AS f
+    JOIN server AS s ON f.publisher_id = s.feedback_publisher_id
+    ASOF JOIN alone AS a ON s.action_server_id = a.action_server_id AND f.start_ns >= a.at_ns
     JOIN main.publication AS b ON f.publication_id = b.publication_id
-    GROUP BY f.goal_id
+    GROUP BY a.goal_id
 ),
 cancelled AS (
     SELECT c.goal_id, min(q.sent_ns) AS asked_ns, min(b.start_ns) AS accepted_ns

@@ -23,8 +23,8 @@ WITH trace_clock AS (
 corrected AS (
     SELECT
         self.*,
-        derive.corrected_ns(self.sent_ns, s.offset_ns, s.drift_ppb, s.reference_ns) AS from_ns,
-        derive.corrected_ns(self.received_ns, r.offset_ns, r.drift_ppb, r.reference_ns) AS to_ns
+        derive.corrected_ns(self.sent_ns, s) AS from_ns,
+        derive.corrected_ns(self.received_ns, r) AS to_ns
     FROM store.link_packet AS self
     JOIN trace_clock AS s ON self.sent_trace_id = s.trace_id
     JOIN trace_clock AS r ON self.received_trace_id = r.trace_id

@@ -11,8 +11,8 @@
 -- column: end_ns BIGINT [epoch ns]  End
 SELECT
     s.run_id, s.node_id, s.state,
-    derive.corrected_ns(s.start_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS start_ns,
-    derive.corrected_ns(s.end_ns, p.offset_ns, p.drift_ppb, p.reference_ns) AS end_ns
+    derive.corrected_ns(s.start_ns, p) AS start_ns,
+    derive.corrected_ns(s.end_ns, p) AS end_ns
 FROM derive.node_state AS s
 JOIN store.node AS n ON s.node_id = n.node_id
 JOIN derive.process_clock AS p ON n.process_id = p.process_id

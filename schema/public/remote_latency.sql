@@ -22,8 +22,7 @@ way AS (
         l.run_id, l.publication_id, l.take_id, b.end_ns AS sent_ns, t.taken_ns,
         f.host_id AS from_host_id, o.host_id AS to_host_id,
         f.clock_id AS from_clock_id, o.clock_id AS to_clock_id,
-        derive.corrected_ns(t.taken_ns, o.offset_ns, o.drift_ppb, o.reference_ns)
-        - derive.corrected_ns(b.end_ns, f.offset_ns, f.drift_ppb, f.reference_ns) AS latency_ns,
+        derive.corrected_ns(t.taken_ns, o) - derive.corrected_ns(b.end_ns, f) AS latency_ns,
         f.reference_clock_id = o.reference_clock_id AS is_comparable,
         f.uncertainty_ns AS from_uncertainty_ns, o.uncertainty_ns AS to_uncertainty_ns
     FROM store.link_transport AS l

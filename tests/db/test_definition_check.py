@@ -31,8 +31,7 @@ CHANGES = {
     ),
     "view derive.recording_gap": "DROP VIEW derive.recording_gap",
     "macro derive.corrected_ns": (
-        "CREATE OR REPLACE MACRO derive.corrected_ns(time_ns, offset_ns, drift_ppb, reference_ns)"
-        " AS time_ns"
+        "CREATE OR REPLACE MACRO derive.corrected_ns(time_ns, clock) AS time_ns"
     ),
     "macro main.sum": "CREATE MACRO main.sum(x) AS 42",
     "view main.mine": "CREATE VIEW main.mine AS SELECT 1",

@@ -21,16 +21,10 @@
 SELECT
     g.label_group, a.action_name, a.server, a.client,
     count(DISTINCT a.run) AS runs,
-    sum(a.goals)::BIGINT AS goals,
-    sum(a.accepted)::BIGINT AS accepted,
-    sum(a.rejected)::BIGINT AS rejected,
-    sum(a.not_answered)::BIGINT AS not_answered,
-    sum(a.asked)::BIGINT AS asked,
-    sum(a.finished)::BIGINT AS finished,
-    sum(a.cancelled)::BIGINT AS cancelled,
-    sum(a.doubtful)::BIGINT AS doubtful,
-    sum(a.overlapping)::BIGINT AS overlapping,
-    sum(a.feedback)::BIGINT AS feedback,
+    sum(COLUMNS([
+        'goals', 'accepted', 'rejected', 'not_answered', 'asked', 'finished', 'cancelled',
+        'doubtful', 'overlapping', 'feedback'
+    ]))::BIGINT,
     max(a.accept_median_ns) AS accept_median_most_ns,
     max(a.accept_p99_ns) AS accept_p99_most_ns,
     max(a.accept_max_ns) AS accept_max_ns,

@@ -31,18 +31,13 @@ WITH arrival AS MATERIALIZED (
     JOIN run_group AS g ON f.run = g.run
 ),
 completeness AS (
-    SELECT label_group, path, count(*) AS roots, histogram(status)::MAP(VARCHAR, BIGINT) AS number
+    SELECT
+        label_group, path,
+        count(*) FILTER (is_first IS NOT false) AS roots,
+        histogram(status) FILTER (is_first IS NOT false)::MAP(VARCHAR, BIGINT) AS number,
+        count(DISTINCT (run, path_id, root_kind, root_id)) FILTER (is_loss_affected)
+            AS loss_affected
     FROM arrival
-    WHERE is_first IS NOT false
-    GROUP BY label_group, path
-),
-affected AS (
-    SELECT label_group, path, count(*) AS number
-    FROM (
-        SELECT DISTINCT label_group, path, run, path_id, root_kind, root_id
-        FROM arrival
-        WHERE is_loss_affected
-    )
     GROUP BY label_group, path
 ),
 reason AS (
@@ -60,9 +55,9 @@ reason AS (
 latency AS (
     SELECT
         label_group, path,
+        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         count(latency_ns) AS pairs,
         count(*) - count(latency_ns) AS stored,
-        count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         string_agg(DISTINCT sink_event, ', ' ORDER BY sink_event) AS sink_event,
         min(latency_ns) AS min_ns,
         quantile_disc(latency_ns, [0.5, 0.95, 0.99]) AS quantiles,
@@ -93,10 +88,7 @@ SELECT
     coalesce(c.number['not_connected'], 0) AS not_connected,
     coalesce(c.number['unknown'], 0) AS unknown,
     coalesce(c.number['cut_by_recording'], 0) AS cut_by_recording,
-    coalesce(a.number, 0) AS loss_affected,
-    coalesce(l.ambiguous, 0) AS ambiguous,
-    coalesce(l.pairs, 0) AS pairs,
-    coalesce(l.stored, 0) AS stored,
+    coalesce(COLUMNS(['loss_affected', 'ambiguous', 'pairs', 'stored']), 0),
     k.looped, l.min_ns,
     l.quantiles[1] AS median_ns,
     l.mean_ns,
@@ -105,7 +97,6 @@ SELECT
     l.max_ns, l.sink_event, k.is_cut, r.reasons, k.path
 FROM known AS k
 LEFT JOIN completeness AS c ON k.label_group = c.label_group AND k.path = c.path
-LEFT JOIN affected AS a ON k.label_group = a.label_group AND k.path = a.path
 LEFT JOIN latency AS l ON k.label_group = l.label_group AND k.path = l.path
 LEFT JOIN reason AS r ON k.label_group = r.label_group AND k.path = r.path
 ORDER BY k.path, k.label_group

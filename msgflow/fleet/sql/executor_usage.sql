@@ -21,14 +21,10 @@ SELECT
     g.label_group, u.host, u.process, u.executor_kind,
     count(DISTINCT u.run) AS runs,
     count(*) AS threads,
-    sum(u.seen_ns)::BIGINT AS seen_ns,
-    sum(u.wait_ns)::BIGINT AS wait_ns,
-    sum(u.select_ns)::BIGINT AS select_ns,
-    sum(u.take_ns)::BIGINT AS take_ns,
-    sum(u.callback_ns)::BIGINT AS callback_ns,
-    sum(u.blocked_ns)::BIGINT AS blocked_ns,
-    sum(u.unknown_ns)::BIGINT AS unknown_ns,
-    sum(u.callbacks)::BIGINT AS callbacks,
+    sum(COLUMNS([
+        'seen_ns', 'wait_ns', 'select_ns', 'take_ns', 'callback_ns', 'blocked_ns', 'unknown_ns',
+        'callbacks'
+    ]))::BIGINT,
     sum(u.callback_ns) / nullif(sum(u.seen_ns), 0)::DOUBLE AS callback_share,
     max(u.callback_share) AS callback_share_max
 FROM executor_usage AS u

@@ -2,15 +2,13 @@
 -- description: What msgflow info --section quality says of each run, added up over all its traces
 --     and over all its processes, and over the runs. Each topic has a row.
 -- grain: one row per scope, topic, measure and group of runs
+-- like: queries.info-quality
 -- column: label_group BIGINT     Group of runs
--- column: scope VARCHAR          'trace', 'process', 'topic' or 'run'
+-- column: scope
 -- column: topic VARCHAR [topic]  Topic; empty: not of one
--- column: measure VARCHAR        What is counted
+-- column: measure
 -- column: runs BIGINT            Runs in which something is affected
--- column: affected BIGINT        How many are affected; for gap_time: nanoseconds in gaps
--- column: total BIGINT           How many there are; for gap_time: nanoseconds traced
--- column: affected_percent DOUBLE [%]  Share affected
--- column: is_internal BOOLEAN    ROS uses the topic for itself
+-- column: affected, total, affected_percent, is_internal
 -- brief: scope, topic, measure, runs, affected, total, affected_percent
 -- answer: affected
 SELECT

@@ -1,13 +1,11 @@
 -- title: The slowest flows of every path
 -- description: Flows that reached the end, by their first arrival.
 -- grain: one row per flow
+-- like: worst
 -- param: count BIGINT {1..} = 10  Most rows of a path
--- column: path VARCHAR [path]     Nodes and topics
--- column: run VARCHAR             Key of the run
--- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: path, run, latency_ns
 -- column: at_ns BIGINT [ns]       Start of the root, since the start of the run
--- column: root_kind VARCHAR       'callback_instance', 'publication' or 'take'
--- column: root_id BIGINT          Identity of the root in the database of the run
+-- column: root_kind, root_id
 SELECT f.path, f.run, f.latency_ns, f.root_ns - r.start_ns AS at_ns, f.root_kind, f.root_id
 FROM flow AS f
 JOIN run AS r ON f.run = r.run

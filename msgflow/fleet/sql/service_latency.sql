@@ -2,10 +2,8 @@
 -- description: As the query service-latency says it of one run. Quantiles of runs cannot be added
 --     up: the largest of any run stands for them.
 -- grain: one row per service, client and group of runs
--- like: queries.service-latency
--- column: label_group BIGINT          Group of runs
--- column: service_name, server, client
--- column: runs BIGINT                 Runs that have it
+-- like: queries.service-latency, topics_delivery
+-- column: label_group, service_name, server, client, runs
 -- column: requests BIGINT             Requests sent or taken
 -- column: answered, not_taken, not_answered, not_received, negative, round_trip_min_ns
 -- column: round_trip_median_most_ns BIGINT [ns]  Largest median round trip
@@ -16,12 +14,9 @@
 SELECT
     g.label_group, s.service_name, s.server, s.client,
     count(DISTINCT s.run) AS runs,
-    sum(s.requests)::BIGINT AS requests,
-    sum(s.answered)::BIGINT AS answered,
-    sum(s.not_taken)::BIGINT AS not_taken,
-    sum(s.not_answered)::BIGINT AS not_answered,
-    sum(s.not_received)::BIGINT AS not_received,
-    sum(s.negative)::BIGINT AS negative,
+    sum(COLUMNS([
+        'requests', 'answered', 'not_taken', 'not_answered', 'not_received', 'negative'
+    ]))::BIGINT,
     min(s.round_trip_min_ns) AS round_trip_min_ns,
     max(s.round_trip_median_ns) AS round_trip_median_most_ns,
     max(s.round_trip_p99_ns) AS round_trip_p99_most_ns,

@@ -19,9 +19,7 @@
 SELECT
     g.label_group, t.node, t.callback,
     count(DISTINCT t.run) AS runs,
-    sum(t.count)::BIGINT AS count,
-    sum(t.missed)::BIGINT AS missed,
-    sum(t.bunched)::BIGINT AS bunched,
+    sum(COLUMNS(['count', 'missed', 'bunched']))::BIGINT,
     max(t.jitter_median_ns) AS jitter_median_most_ns,
     max(t.jitter_p99_ns) AS jitter_p99_most_ns,
     max(t.jitter_max_ns) AS jitter_max_ns,

@@ -20,14 +20,10 @@ WITH merged AS (
         g.label_group, d.topic_name, d.subscriber,
         count(DISTINCT d.run) AS runs,
         count(DISTINCT d.run) FILTER (WHERE d.dropped + d.lost > 0) AS lossy_runs,
-        sum(d.published)::BIGINT AS published,
-        sum(d.delivered)::BIGINT AS delivered,
-        sum(d.dropped)::BIGINT AS dropped,
-        sum(d.lost)::BIGINT AS lost,
-        sum(d.not_connected)::BIGINT AS not_connected,
-        sum(d.cut_by_recording)::BIGINT AS cut_by_recording,
-        sum(d.unknown)::BIGINT AS unknown,
-        sum(d.orphans)::BIGINT AS orphans,
+        sum(COLUMNS([
+            'published', 'delivered', 'dropped', 'lost', 'not_connected', 'cut_by_recording',
+            'unknown', 'orphans'
+        ]))::BIGINT,
         bool_and(d.is_internal) AS is_internal
     FROM topics_delivery AS d
     JOIN run_group AS g ON d.run = g.run

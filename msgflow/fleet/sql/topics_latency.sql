@@ -2,27 +2,20 @@
 -- description: As the query topics --measure latency says it of one run. Quantiles of several
 --     subscriptions are off by less than 1 %, means by less than 1 ns, all else is exact.
 -- grain: one row per topic, receiving node and group of runs
--- like: e2e_latency
--- column: label_group BIGINT        Group of runs
--- column: topic_name VARCHAR [topic]  Topic
--- column: subscriber VARCHAR [node]  Node that received
+-- like: e2e_latency, queries.topics-latency
+-- column: label_group, topic_name, subscriber
 -- column: runs BIGINT               Runs that have it
 -- column: takes BIGINT              Messages received
--- column: linked BIGINT             Takes whose publication is known
+-- column: linked
 -- column: ambiguous BIGINT          Links with more than one candidate
--- column: negative BIGINT           Links with negative latency
--- column: min_ns, median_ns, mean_ns, p95_ns, p99_ns, max_ns
--- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- column: negative, min_ns, median_ns, mean_ns, p95_ns, p99_ns, max_ns, is_internal
 -- brief: topic_name, subscriber, median_ns, p95_ns, max_ns, runs, takes, linked, negative,
 --     ambiguous, mean_ns, p99_ns, min_ns
 WITH merged AS (
     SELECT
         g.label_group, t.topic_name, t.subscriber,
         count(DISTINCT t.run) AS runs,
-        sum(t.takes)::BIGINT AS takes,
-        sum(t.linked)::BIGINT AS linked,
-        sum(t.ambiguous)::BIGINT AS ambiguous,
-        sum(t.negative)::BIGINT AS negative,
+        sum(COLUMNS(['takes', 'linked', 'ambiguous', 'negative']))::BIGINT,
         min(t.min_ns) AS min_ns,
         CASE WHEN count(*) = 1 THEN any_value(t.median_ns) END AS median_ns,
         round(sum(t.mean_ns * t.linked) / nullif(sum(t.linked), 0))::BIGINT AS mean_ns,

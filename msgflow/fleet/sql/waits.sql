@@ -2,33 +2,25 @@
 -- description: As the query waits says it of one run. The median of several callbacks is off
 --     by less than 1 %, all else is exact.
 -- grain: one row per node, callback and group of runs
--- like: queries.waits
--- column: label_group BIGINT        Group of runs
--- column: node VARCHAR [node]  Node of the callback
--- column: callback VARCHAR [callback]  What triggers it
--- column: runs BIGINT               Runs that have it
+-- like: queries.waits, action_latency
+-- column: label_group, node, callback, runs
 -- column: count BIGINT              Callback instances
 -- column: delayed_min, delayed_max, wait_median_ns, wait_max_ns, busy_worst_ns, busy_total_min_ns,
---     busy_total_max_ns, rest_total_min_ns, rest_total_max_ns, unknown, loss_affected
--- column: is_internal BOOLEAN       Infrastructure of ROS
+--     busy_total_max_ns, rest_total_min_ns, rest_total_max_ns, unknown, loss_affected, is_internal
 -- brief: node, callback, wait_median_ns, wait_max_ns, busy_worst_ns, runs, count,
 --     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
 WITH merged AS (
     SELECT
         g.label_group, w.node, w.callback,
         count(DISTINCT w.run) AS runs,
-        sum(w.count)::BIGINT AS count,
-        sum(w.delayed_min)::BIGINT AS delayed_min,
-        sum(w.delayed_max)::BIGINT AS delayed_max,
+        sum(COLUMNS(['count', 'delayed_min', 'delayed_max']))::BIGINT,
         CASE WHEN count(*) = 1 THEN any_value(w.wait_median_ns) END AS wait_median_ns,
         max(w.wait_max_ns) AS wait_max_ns,
         max(w.busy_worst_ns) AS busy_worst_ns,
-        sum(w.busy_total_min_ns)::BIGINT AS busy_total_min_ns,
-        sum(w.busy_total_max_ns)::BIGINT AS busy_total_max_ns,
-        sum(w.rest_total_min_ns)::BIGINT AS rest_total_min_ns,
-        sum(w.rest_total_max_ns)::BIGINT AS rest_total_max_ns,
-        sum(w.unknown)::BIGINT AS unknown,
-        sum(w.loss_affected)::BIGINT AS loss_affected,
+        sum(COLUMNS([
+            'busy_total_min_ns', 'busy_total_max_ns', 'rest_total_min_ns', 'rest_total_max_ns',
+            'unknown', 'loss_affected'
+        ]))::BIGINT,
         bool_and(w.is_internal) AS is_internal
     FROM waits AS w
     JOIN run_group AS g ON w.run = g.run

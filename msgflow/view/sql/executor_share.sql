@@ -23,22 +23,14 @@ clipped AS (
     FROM did AS d
     CROSS JOIN extent AS e
 ),
-whole AS (
-    SELECT thread_id, activity, width, begin_at, end_at, begin_at // width AS bin
-    FROM clipped
-    WHERE begin_at // width = (end_at - 1) // width
-    UNION ALL
-    SELECT
-        thread_id, activity, width, begin_at, end_at,
-        unnest(range(begin_at // width, (end_at - 1) // width + 1))
-    FROM clipped
-    WHERE begin_at // width <> (end_at - 1) // width
+cut AS (
+    SELECT *, unnest(range(begin_at // width, (end_at - 1) // width + 1)) AS bin FROM clipped
 )
 SELECT
     thread_id,
     $start_ns - $origin_ns + bin * width AS start_at,
     width AS length, activity,
     sum(least(end_at, (bin + 1) * width) - greatest(begin_at, bin * width))::BIGINT AS busy
-FROM whole
+FROM cut
 GROUP BY thread_id, bin, width, activity
 ORDER BY thread_id, start_at, activity

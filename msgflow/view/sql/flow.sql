@@ -36,18 +36,15 @@ reached AS MATERIALIZED (
     )
     GROUP BY kind, id
 ),
-vertex AS (
-    SELECT r.kind AS name, c.code AS kind, r.id, r.is_effect, r.is_cause
+drawn AS MATERIALIZED (
+    SELECT
+        c.name, c.code AS kind, r.id, r.is_effect, r.is_cause, b.row_key, b.start_ns, b.end_ns,
+        b.flags
     FROM reached AS r
     JOIN code AS c ON r.kind = c.name
-),
-drawn AS MATERIALIZED (
-    SELECT v.name, v.kind, v.id, v.is_effect, v.is_cause, b.row_key, b.start_ns, b.end_ns, b.flags
-    FROM vertex AS v
-    JOIN bar AS b ON v.kind = b.kind AND v.id = b.id
+    JOIN bar AS b ON c.code = b.kind AND r.id = b.id
 ),
 near AS MATERIALIZED (
-    SELECT d.name, d.kind, d.id, d.is_effect, d.is_cause, d.row_key, d.start_ns, d.end_ns, d.flags
     FROM drawn AS d
     ORDER BY
         abs(d.start_ns - (SELECT min(start_ns) FROM drawn WHERE name = $kind AND id = $id)),

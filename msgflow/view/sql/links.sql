@@ -55,16 +55,11 @@ cause AS (
         AND CASE WHEN l.kind = 'direct' THEN l.publication_id <= $last_publication
             WHEN l.callback_instance_id IS NULL THEN l.take_id <= $last_take
             ELSE l.callback_instance_id <= $last_instance END
-),
-arrow AS (
-    SELECT link_kind, from_row, to_row, from_ns, to_ns, is_loss_affected FROM message
-    UNION ALL
-    SELECT link_kind, from_row, to_row, from_ns, to_ns, is_loss_affected FROM cause
 )
 SELECT
     link_kind, from_row, to_row, from_ns - $origin_ns AS from_at, to_ns - $origin_ns AS to_at,
     is_loss_affected
-FROM arrow
+FROM (FROM message UNION ALL FROM cause)
 WHERE from_row IS NOT NULL AND to_row IS NOT NULL
     AND least(from_ns, to_ns) < $end_ns AND greatest(from_ns, to_ns) >= $start_ns
 ORDER BY from_at, to_at, link_kind, from_row, to_row

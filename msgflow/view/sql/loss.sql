@@ -12,11 +12,6 @@
 -- column: kind VARCHAR  What the first one is: 'publication' or 'take'
 -- column: id BIGINT  Identity of the first one
 -- column: is_internal BOOLEAN  ROS uses the topic for itself
-WITH missing AS (
-    SELECT at_ns, kind, id, subscription_id, process_id, status, reason
-    FROM missing_side
-    WHERE run_id = $run AND at_ns >= $start_ns AND at_ns < $end_ns
-)
 SELECT
     s.topic_name AS topic,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
@@ -27,9 +22,10 @@ SELECT
     m.kind,
     arg_min(m.id, (m.at_ns, m.id)) AS id,
     bool_or(coalesce(s.is_internal, false)) AS is_internal
-FROM missing AS m
+FROM missing_side AS m
 LEFT JOIN main.subscription AS s ON m.subscription_id = s.subscription_id
 LEFT JOIN main.node AS n ON s.node_id = n.node_id
 LEFT JOIN main.process AS p ON m.process_id = p.process_id
+WHERE m.run_id = $run AND m.at_ns >= $start_ns AND m.at_ns < $end_ns
 GROUP BY ALL
 ORDER BY count DESC, topic, subscriber, m.status, m.reason, id

@@ -9,19 +9,15 @@
 -- column: reason VARCHAR  Why the other side is missing
 -- column: count BIGINT  Messages, or takes
 -- column: is_internal BOOLEAN  ROS uses the topic for itself
-WITH missing AS (
-    SELECT at_ns, subscription_id, status, reason
-    FROM missing_side
-    WHERE run_id = $run AND at_ns >= $start_ns AND at_ns < $end_ns
-),
-extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width)
+WITH extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width)
 SELECT
     $start_ns - $origin_ns + (m.at_ns - $start_ns) // e.width * e.width AS start_at,
     e.width AS length, s.topic_name AS topic, m.status, m.reason,
     count(*) AS count,
     coalesce(s.is_internal, false) AS is_internal
-FROM missing AS m
+FROM missing_side AS m
 CROSS JOIN extent AS e
 LEFT JOIN main.subscription AS s ON m.subscription_id = s.subscription_id
+WHERE m.run_id = $run AND m.at_ns >= $start_ns AND m.at_ns < $end_ns
 GROUP BY ALL
 ORDER BY start_at, topic, m.status, m.reason, is_internal

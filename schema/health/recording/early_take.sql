@@ -17,8 +17,7 @@ SELECT
 FROM (
     SELECT
         l.run_id,
-        derive.corrected_ns(t.taken_ns, c.offset_ns, c.drift_ppb, c.reference_ns)
-        - derive.corrected_ns(b.end_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latency_ns
+        derive.corrected_ns(t.taken_ns, c) - derive.corrected_ns(b.end_ns, c) AS latency_ns
     FROM store.link_transport AS l
     JOIN store.publication AS b ON l.publication_id = b.publication_id
     JOIN store.take AS t ON l.take_id = t.take_id

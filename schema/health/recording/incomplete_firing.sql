@@ -13,6 +13,6 @@ SELECT
     'publications that an annotation explains, but for which some of its inputs had no message '
     || 'when the callback that publishes began (none yet, none since the caches were emptied, one '
     || 'that came only meanwhile, or a gap lies in between): see annotation_firing' AS detail
-FROM derive.annotation_firing
-WHERE linked_count < input_count
+FROM main.annotation_firing
+WHERE NOT is_complete
 GROUP BY run_id

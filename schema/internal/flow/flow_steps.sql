@@ -48,7 +48,7 @@ next AS (
 went_on AS (
     SELECT
         s.publication_id,
-        derive.corrected_ns(n.at_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS until_ns
+        derive.corrected_ns(n.at_ns, c) AS until_ns
     FROM sent AS s
     ASOF JOIN (
         SELECT thread_id, event_id, at_ns

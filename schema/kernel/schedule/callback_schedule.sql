@@ -37,11 +37,7 @@ interrupt AS (
         i.end_ns + s.shift_ns AS end_ns
     FROM raw.interrupt AS i
     JOIN staging.schedule AS s ON i.trace_index = s.trace_index
-    JOIN staging.thread_tid AS t
-        ON s.clock_key = t.clock_key
-        AND i.tid = t.tid
-        AND i.start_ns + s.shift_ns >= t.from_ns
-        AND i.start_ns + s.shift_ns < t.until_ns
+    JOIN staging.thread_tid AS t ON staging.has_tid(t, s.clock_key, i.tid, i.start_ns + s.shift_ns)
     ASOF JOIN (SELECT * FROM staging.thread_state WHERE state = 'running') AS r
         ON t.thread_id = r.thread_id AND i.start_ns + s.shift_ns >= r.start_ns
     WHERE s.is_joined AND i.kind <> 'timer'
@@ -76,11 +72,9 @@ recorded AS (
 )
 SELECT
     i.callback_instance_id,
-    coalesce(p.running_ns, 0)::BIGINT AS running_ns,
-    coalesce(p.preempted_ns, 0)::BIGINT AS preempted_ns,
-    coalesce(p.runnable_ns, 0)::BIGINT AS runnable_ns,
-    coalesce(p.sleeping_ns, 0)::BIGINT AS sleeping_ns,
-    coalesce(p.uninterruptible_ns, 0)::BIGINT AS uninterruptible_ns,
+    coalesce(COLUMNS([
+        'running_ns', 'preempted_ns', 'runnable_ns', 'sleeping_ns', 'uninterruptible_ns'
+    ]), 0)::BIGINT,
     (
         i.end_ns - i.start_ns - coalesce(p.running_ns, 0) - coalesce(p.preempted_ns, 0)
         - coalesce(p.runnable_ns, 0) - coalesce(p.sleeping_ns, 0)

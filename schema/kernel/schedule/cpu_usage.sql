@@ -100,9 +100,5 @@ FROM usage AS u
 JOIN host AS h ON u.clock_key = h.clock_key
 LEFT JOIN named AS n ON u.clock_key = n.clock_key AND u.tid = n.tid
 LEFT JOIN frequency AS f ON u.clock_key = f.clock_key AND u.cpu = f.cpu AND u.second = f.second
-LEFT JOIN staging.thread_tid AS t
-    ON u.clock_key = t.clock_key
-    AND u.tid = t.tid
-    AND u.first_ns >= t.from_ns
-    AND u.first_ns < t.until_ns
+LEFT JOIN staging.thread_tid AS t ON staging.has_tid(t, u.clock_key, u.tid, u.first_ns)
 ORDER BY h.host_id, u.second, u.cpu, u.tid

@@ -7,11 +7,7 @@ WITH migration AS (
     SELECT t.thread_id, t.tid, m.ts_ns + s.shift_ns AS at_ns, m.dest_cpu AS cpu
     FROM raw.sched_migrate_task AS m
     JOIN staging.schedule AS s ON m.trace_index = s.trace_index
-    JOIN staging.thread_tid AS t
-        ON s.clock_key = t.clock_key
-        AND m.tid = t.tid
-        AND m.ts_ns + s.shift_ns >= t.from_ns
-        AND m.ts_ns + s.shift_ns < t.until_ns
+    JOIN staging.thread_tid AS t ON staging.has_tid(t, s.clock_key, m.tid, m.ts_ns + s.shift_ns)
     WHERE s.is_joined
 ),
 wait AS (SELECT * FROM staging.schedule_interval WHERE state IN ('preempted', 'runnable')),

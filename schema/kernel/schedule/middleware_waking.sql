@@ -16,9 +16,5 @@ FROM raw.sched_waking AS k
 JOIN staging.schedule AS s ON k.trace_index = s.trace_index
 JOIN receiver AS r ON s.clock_key = r.clock_key AND k.tid = r.tid
 JOIN raw.sched_switch AS w ON k.switch_event_id = w.event_id
-JOIN staging.thread_tid AS p
-    ON s.clock_key = p.clock_key
-    AND w.next_tid = p.tid
-    AND k.ts_ns + s.shift_ns >= p.from_ns
-    AND k.ts_ns + s.shift_ns < p.until_ns
+JOIN staging.thread_tid AS p ON staging.has_tid(p, s.clock_key, w.next_tid, k.ts_ns + s.shift_ns)
 WHERE s.is_joined AND k.interrupt IS NULL

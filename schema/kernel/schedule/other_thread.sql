@@ -23,11 +23,7 @@ SELECT
 FROM (
     SELECT DISTINCT o.clock_key, o.tid, o.name
     FROM seen AS o
-    LEFT JOIN staging.thread_tid AS t
-        ON o.clock_key = t.clock_key
-        AND o.tid = t.tid
-        AND o.at_ns >= t.from_ns
-        AND o.at_ns < t.until_ns
+    LEFT JOIN staging.thread_tid AS t ON staging.has_tid(t, o.clock_key, o.tid, o.at_ns)
     WHERE t.thread_id IS NULL
 ) AS o
 JOIN host AS h ON o.clock_key = h.clock_key

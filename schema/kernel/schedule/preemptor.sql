@@ -7,11 +7,7 @@ SELECT
     CASE WHEN t.thread_id IS NULL THEN o.other_thread_id END AS preemptor_other_thread_id,
     c.priority AS preemptor_priority, c.thread_priority
 FROM staging.cpu_taken AS c
-LEFT JOIN staging.thread_tid AS t
-    ON c.clock_key = t.clock_key
-    AND c.tid = t.tid
-    AND c.start_ns >= t.from_ns
-    AND c.start_ns < t.until_ns
+LEFT JOIN staging.thread_tid AS t ON staging.has_tid(t, c.clock_key, c.tid, c.start_ns)
 LEFT JOIN staging.other_thread AS o
     ON c.clock_key = o.clock_key AND c.tid = o.tid AND c.name IS NOT DISTINCT FROM o.name
 ORDER BY c.thread_id, c.start_ns

@@ -46,11 +46,7 @@ JOIN (SELECT DISTINCT thread_id, clock_key FROM staging.thread_tid) AS t
 LEFT JOIN staging.preemptor AS p
     ON i.state = 'preempted' AND i.thread_id = p.thread_id AND i.start_ns = p.start_ns
 LEFT JOIN staging.thread_waking AS w ON i.waking_event_id = w.event_id
-LEFT JOIN staging.thread_tid AS wt
-    ON w.clock_key = wt.clock_key
-    AND w.waker_tid = wt.tid
-    AND w.at_ns >= wt.from_ns
-    AND w.at_ns < wt.until_ns
+LEFT JOIN staging.thread_tid AS wt ON staging.has_tid(wt, w.clock_key, w.waker_tid, w.at_ns)
 LEFT JOIN staging.other_thread AS wo
     ON w.clock_key = wo.clock_key
     AND w.waker_tid = wo.tid

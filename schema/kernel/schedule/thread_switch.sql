@@ -30,22 +30,14 @@ SELECT
     t.thread_id, t.tid, w.trace_index, w.event_id, w.at_ns, w.cpu, true AS is_on,
     NULL::BIGINT AS unseen_since_ns, w.next_priority AS priority, NULL::BIGINT AS prev_state
 FROM switch AS w
-JOIN staging.thread_tid AS t
-    ON w.clock_key = t.clock_key
-    AND w.next_tid = t.tid
-    AND w.at_ns >= t.from_ns
-    AND w.at_ns < t.until_ns
+JOIN staging.thread_tid AS t ON staging.has_tid(t, w.clock_key, w.next_tid, w.at_ns)
 UNION ALL
 SELECT
     t.thread_id, t.tid, w.trace_index, w.event_id, w.at_ns, w.cpu, false,
     u.since_ns + w.shift_ns, w.prev_priority, w.prev_state
 FROM switch AS w
 LEFT JOIN unseen AS u ON w.event_id = u.event_id
-JOIN staging.thread_tid AS t
-    ON w.clock_key = t.clock_key
-    AND w.prev_tid = t.tid
-    AND w.at_ns >= t.from_ns
-    AND w.at_ns < t.until_ns
+JOIN staging.thread_tid AS t ON staging.has_tid(t, w.clock_key, w.prev_tid, w.at_ns)
 UNION ALL
 SELECT
     t.thread_id, t.tid, s.trace_index, min(m.event_id), min(m.at_ns) + s.shift_ns, w.cpu, true,
@@ -59,11 +51,7 @@ JOIN staging.context AS x
     AND m.event_id >= x.from_event_id
     AND m.event_id < x.until_event_id
 JOIN staging.thread_tid AS t
-    ON s.clock_key = t.clock_key
-    AND m.tid = t.tid
-    AND x.thread_id = t.thread_id
-    AND w.at_ns >= t.from_ns
-    AND w.at_ns < t.until_ns
+    ON x.thread_id = t.thread_id AND staging.has_tid(t, s.clock_key, m.tid, w.at_ns)
 GROUP BY
     t.thread_id, t.tid, s.trace_index, m.contradiction_id, s.shift_ns, w.cpu, u.since_ns,
     w.prev_priority

@@ -22,11 +22,7 @@ woken AS (
         k.target_cpu, k.switch_event_id, k.interrupt
     FROM waking AS k
     JOIN staging.schedule AS s ON k.trace_index = s.trace_index
-    JOIN staging.thread_tid AS t
-        ON s.clock_key = t.clock_key
-        AND k.tid = t.tid
-        AND k.ts_ns + s.shift_ns >= t.from_ns
-        AND k.ts_ns + s.shift_ns < t.until_ns
+    JOIN staging.thread_tid AS t ON staging.has_tid(t, s.clock_key, k.tid, k.ts_ns + s.shift_ns)
     WHERE s.is_joined
 ),
 during AS (

@@ -23,29 +23,22 @@ WITH sized AS (
 ),
 release AS (
     SELECT
-        r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.start_ns,
-        r.previous_start_ns, r.since, r.origin_ns, r.subscribed_ns, s.thread_count,
-        least(r.latest_ns, min(CASE WHEN s.is_in_order THEN r.returned_ns END) OVER (
-            PARTITION BY r.thread_id ORDER BY r.start_ns, r.callback_instance_id
-            ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING
-        )) AS latest_ns
+        r.* REPLACE (
+            least(r.latest_ns, min(CASE WHEN s.is_in_order THEN r.returned_ns END) OVER (
+                PARTITION BY r.thread_id ORDER BY r.start_ns, r.callback_instance_id
+                ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING
+            )) AS latest_ns
+        ),
+        s.thread_count
     FROM derive.callback_release('sized', has_calls) AS r
     JOIN sized AS s ON r.executor_id = s.executor_id
 ),
 -- A thread among several picks what it will run when it begins to look, not when it runs it:
 -- another thread may have gone to wait in the meantime.
 picked AS (
-    SELECT
-        run_id, executor_id, thread_id, callback_id, callback_instance_id, start_ns,
-        previous_start_ns, since, origin_ns, subscribed_ns, latest_ns, thread_count,
-        start_ns AS picked_ns
-    FROM release
-    WHERE thread_count = 1
+    SELECT *, start_ns AS picked_ns FROM release WHERE thread_count = 1
     UNION ALL
-    SELECT
-        r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.start_ns,
-        r.previous_start_ns, r.since, r.origin_ns, r.subscribed_ns, r.latest_ns, r.thread_count,
-        s.start_ns
+    SELECT r.*, s.start_ns
     FROM (SELECT * FROM release WHERE has_teams AND thread_count > 1) AS r
     ASOF LEFT JOIN (
         SELECT e.thread_id, e.start_ns
@@ -57,10 +50,8 @@ picked AS (
 ),
 polled AS (
     SELECT
-        p.run_id, p.executor_id, p.thread_id, p.callback_id, p.callback_instance_id, p.start_ns,
-        p.previous_start_ns, p.since, p.origin_ns, p.subscribed_ns, p.latest_ns, p.thread_count,
-        p.picked_ns, w.end_ns AS polled_ns, w.previous_end_ns, w.asleep_ns,
-        w.start_ns AS wait_start_ns, w.before_ns AS wait_before_ns
+        p.*, w.start_ns AS wait_start_ns, w.end_ns AS wait_end_ns, w.before_ns AS wait_before_ns,
+        w.previous_end_ns AS previous_wait_end_ns, w.asleep_ns
     FROM picked AS p
     ASOF LEFT JOIN derive.executor_poll('sized') AS w
         ON p.executor_id = w.executor_id AND p.picked_ns >= w.end_ns
@@ -77,41 +68,31 @@ resumed AS (
 ),
 known AS (
     SELECT
-        p.run_id, p.executor_id, p.thread_id, p.callback_id, p.callback_instance_id, p.start_ns,
-        p.since, p.origin_ns, p.subscribed_ns, p.latest_ns, p.thread_count, p.picked_ns,
-        b.resumed_ns,
-        p.polled_ns AS wait_end_ns, p.wait_start_ns, p.wait_before_ns, p.previous_end_ns,
-        CASE WHEN p.polled_ns < b.resumed_ns THEN NULL ELSE p.polled_ns END AS polled_ns,
-        CASE
-            WHEN p.previous_end_ns < b.resumed_ns THEN NULL
-            WHEN p.previous_end_ns <= p.previous_start_ns THEN NULL
-            WHEN p.thread_count = 1 THEN p.previous_end_ns
-        END AS not_polled_ns,
-        CASE WHEN p.thread_count = 1 AND coalesce(p.asleep_ns >= b.resumed_ns, true)
-            THEN p.asleep_ns END AS asleep_ns
+        p.*, b.resumed_ns,
+        least(p.latest_ns, CASE WHEN p.wait_end_ns < b.resumed_ns THEN NULL ELSE p.wait_end_ns END)
+            AS polled_ns,
+        greatest(
+            CASE
+                WHEN p.previous_wait_end_ns < b.resumed_ns THEN NULL
+                WHEN p.previous_wait_end_ns <= p.previous_start_ns THEN NULL
+                WHEN p.thread_count = 1 THEN p.previous_wait_end_ns
+            END,
+            CASE WHEN p.thread_count = 1 AND coalesce(p.asleep_ns >= b.resumed_ns, true)
+                THEN p.asleep_ns END
+        ) AS not_ready_ns
     FROM polled AS p
     LEFT JOIN resumed AS b ON p.callback_instance_id = b.callback_instance_id
 ),
-confined AS (
-    SELECT
-        run_id, executor_id, thread_id, callback_id, callback_instance_id, start_ns, since,
-        origin_ns, subscribed_ns, latest_ns, thread_count, picked_ns, resumed_ns, polled_ns,
-        wait_start_ns, wait_end_ns, wait_before_ns, previous_end_ns,
-        greatest(not_polled_ns, asleep_ns) AS not_ready_ns
-    FROM known
-),
 bounded AS (
     SELECT
-        run_id, executor_id, thread_id, callback_id, callback_instance_id, start_ns, since,
-        thread_count, picked_ns, resumed_ns, latest_ns, wait_start_ns, wait_end_ns,
-        wait_before_ns, previous_end_ns,
-        CASE WHEN since = 'timer' THEN greatest(origin_ns, not_ready_ns) ELSE origin_ns END
-            AS origin_ns,
+        * REPLACE (
+            CASE WHEN since = 'timer' THEN greatest(origin_ns, not_ready_ns) ELSE origin_ns END
+                AS origin_ns
+        ),
         CASE WHEN origin_ns IS NOT NULL OR not_ready_ns IS NOT NULL
             THEN least(greatest(origin_ns, subscribed_ns, not_ready_ns), start_ns)
-        END AS earliest_ns,
-        least(latest_ns, polled_ns) AS polled_ns
-    FROM confined
+        END AS earliest_ns
+    FROM known
 )
 SELECT
     run_id, executor_id, thread_id, callback_id, callback_instance_id, since, origin_ns,
@@ -122,6 +103,6 @@ SELECT
         AS latest_ns,
     start_ns, thread_count,
     coalesce(picked_ns, start_ns) AS picked_ns,
-    wait_start_ns, wait_end_ns, wait_before_ns, previous_end_ns AS previous_wait_end_ns,
+    wait_start_ns, wait_end_ns, wait_before_ns, previous_wait_end_ns,
     coalesce(resumed_ns > coalesce(earliest_ns, polled_ns), false) AS is_loss_affected
 FROM bounded

@@ -34,17 +34,14 @@ started AS (
 ),
 -- Used by messages and requests, at both ends.
 clock AS MATERIALIZED (FROM derive.process_clock),
-pair AS MATERIALIZED (FROM derive.clock_comparable),
 message AS (
     SELECT
         t.take_id, t.taken_ns, s.created_ns,
         CASE
             WHEN l.publication_id IS NULL AND t.source_timestamp_ns <= t.taken_ns
                 THEN t.source_timestamp_ns
-            WHEN p.is_comparable THEN t.taken_ns - greatest(
-                derive.corrected_ns(t.taken_ns, tc.offset_ns, tc.drift_ppb, tc.reference_ns)
-                - derive.corrected_ns(b.end_ns, bc.offset_ns, bc.drift_ppb, bc.reference_ns),
-                0
+            WHEN derive.is_comparable(tc, bc) THEN t.taken_ns - greatest(
+                derive.corrected_ns(t.taken_ns, tc) - derive.corrected_ns(b.end_ns, bc), 0
             )
         END AS origin_ns,
         CASE WHEN l.publication_id IS NULL THEN 'stamp' ELSE 'publication' END AS since,
@@ -56,22 +53,17 @@ message AS (
     LEFT JOIN store.publication AS b ON l.publication_id = b.publication_id
     LEFT JOIN store.data_arrival AS d ON t.take_id = d.take_id
     LEFT JOIN clock AS bc ON b.process_id = bc.process_id
-    LEFT JOIN pair AS p ON b.process_id = p.process_id AND t.process_id = p.other_process_id
 ),
 request AS (
     SELECT
         q.request_id,
-        CASE WHEN p.is_comparable THEN q.taken_ns - greatest(
-            derive.corrected_ns(q.taken_ns, rc.offset_ns, rc.drift_ppb, rc.reference_ns)
-            - derive.corrected_ns(q.sent_ns, sc.offset_ns, sc.drift_ppb, sc.reference_ns),
-            0
+        CASE WHEN derive.is_comparable(rc, sc) THEN q.taken_ns - greatest(
+            derive.corrected_ns(q.taken_ns, rc) - derive.corrected_ns(q.sent_ns, sc), 0
         ) END AS origin_ns,
         q.taken_ns
     FROM store.request AS q
     LEFT JOIN store.thread AS sender ON q.sender_thread_id = sender.thread_id
     JOIN store.thread AS receiver ON q.receiver_thread_id = receiver.thread_id
-    LEFT JOIN pair AS p
-        ON sender.process_id = p.process_id AND receiver.process_id = p.other_process_id
     LEFT JOIN clock AS sc ON sender.process_id = sc.process_id
     JOIN clock AS rc ON receiver.process_id = rc.process_id
 )

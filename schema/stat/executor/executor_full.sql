@@ -2,12 +2,8 @@
 --     callbacks. `before_ns` is the sum of the earlier stretches.
 -- grain: one row per such stretch
 WITH edge AS (
-    SELECT r.run_id, r.executor_id, r.start_ns AS at_ns, 1 AS step
-    FROM derive.executor_run AS r
-    JOIN derive.executor_size AS s ON r.executor_id = s.executor_id
-    WHERE s.thread_count > 1
-    UNION ALL
-    SELECT r.run_id, r.executor_id, r.end_ns, -1
+    SELECT
+        r.run_id, r.executor_id, unnest([r.start_ns, r.end_ns]) AS at_ns, unnest([1, -1]) AS step
     FROM derive.executor_run AS r
     JOIN derive.executor_size AS s ON r.executor_id = s.executor_id
     WHERE s.thread_count > 1

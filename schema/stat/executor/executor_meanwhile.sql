@@ -21,9 +21,7 @@ run AS (
 -- What a thread runs is in order, so the instances that overlap a wait are neighbours. There are
 -- none, as a rule, where the last one that began before the wait ended was over when it began.
 busy AS (
-    SELECT
-        w.run_id, w.executor_id, w.callback_instance_id, w.from_ns, w.latest_ns, w.start_ns,
-        w.thread_id, l.position AS last_position
+    SELECT w.*, l.position AS last_position
     FROM waiting AS w
     ASOF JOIN run AS l ON w.thread_id = l.thread_id AND w.start_ns > l.start_ns
     WHERE l.end_ns > w.from_ns
@@ -31,17 +29,14 @@ busy AS (
 -- The first is the one that was under way when the wait began, or the next one.
 bounded AS (
     SELECT
-        w.run_id, w.executor_id, w.callback_instance_id, w.from_ns, w.latest_ns, w.start_ns,
-        w.thread_id, w.last_position,
+        w.*,
         CASE WHEN f.end_ns > w.from_ns THEN f.position ELSE coalesce(f.position, 0) + 1 END
             AS first_position
     FROM busy AS w
     ASOF LEFT JOIN run AS f ON w.thread_id = f.thread_id AND w.from_ns >= f.start_ns
 ),
 pair AS (
-    SELECT
-        run_id, executor_id, callback_instance_id, from_ns, latest_ns, start_ns, thread_id,
-        unnest(range(first_position, last_position + 1)) AS position
+    SELECT *, unnest(range(first_position, last_position + 1)) AS position
     FROM bounded
     WHERE first_position <= last_position
 )

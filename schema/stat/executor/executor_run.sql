@@ -6,7 +6,6 @@
 SELECT
     i.run_id, x.executor_id, i.thread_id, i.callback_id, i.callback_instance_id, i.start_ns,
     coalesce(i.end_ns, i.start_ns) AS end_ns,
-    i.take_id, i.request_id,
     row_number() OVER (
         PARTITION BY i.run_id, i.thread_id ORDER BY i.start_ns, i.callback_instance_id
     ) AS position

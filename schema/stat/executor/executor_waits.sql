@@ -15,10 +15,7 @@ exclusion AS MATERIALIZED (FROM derive.callback_exclusion WHERE has_teams),
 -- for as long as it was in all before, and not at all from the end of the last one.
 ready AS MATERIALIZED (
     SELECT
-        r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.since,
-        r.origin_ns, r.earliest_ns, r.latest_ns, r.start_ns, r.thread_count, r.picked_ns,
-        r.wait_start_ns, r.wait_end_ns, r.wait_before_ns, r.previous_wait_end_ns,
-        r.is_loss_affected, b.before_ns AS start_busy_ns,
+        r.*, b.before_ns AS start_busy_ns,
         CASE WHEN r.earliest_ns >= coalesce(b.previous_end_ns, r.earliest_ns) THEN b.before_ns END
             AS earliest_busy_ns,
         CASE WHEN r.latest_ns >= coalesce(b.previous_end_ns, r.latest_ns) THEN b.before_ns END
@@ -187,10 +184,10 @@ measured AS (
 )
 SELECT
     r.run_id, r.callback_instance_id, r.executor_id, r.thread_id, r.callback_id, r.since,
-    derive.corrected_ns(r.origin_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS origin_ns,
-    derive.corrected_ns(r.earliest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS earliest_ns,
-    derive.corrected_ns(r.latest_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS latest_ns,
-    derive.corrected_ns(r.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS start_ns,
+    derive.corrected_ns(r.origin_ns, c) AS origin_ns,
+    derive.corrected_ns(r.earliest_ns, c) AS earliest_ns,
+    derive.corrected_ns(r.latest_ns, c) AS latest_ns,
+    derive.corrected_ns(r.start_ns, c) AS start_ns,
     r.start_ns - r.origin_ns AS wait_ns,
     r.busy_start_ns - r.busy_latest_ns + r.blocked_min_ns AS busy_min_ns,
     r.busy_start_ns - r.busy_earliest_ns + r.blocked_max_ns AS busy_max_ns,

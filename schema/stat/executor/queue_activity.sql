@@ -21,7 +21,7 @@ WITH queue AS (
 started AS (
     SELECT
         i.thread_id, i.start_ns,
-        derive.corrected_ns(i.start_ns, c.offset_ns, c.drift_ppb, c.reference_ns) AS corrected_ns
+        derive.corrected_ns(i.start_ns, c) AS corrected_ns
     FROM store.callback_instance AS i
     JOIN queue AS q ON i.thread_id = q.thread_id
     JOIN derive.process_clock AS c ON q.process_id = c.process_id

@@ -82,13 +82,8 @@ marked AS NOT MATERIALIZED (
 extent AS (
     SELECT
         t.thread_id,
-        derive.recorded_ns(
-            greatest(window_start_ns, -(1::BIGINT << 62)),
-            p.offset_ns, p.drift_ppb, p.reference_ns
-        ) - 1 AS start_ns,
-        derive.recorded_ns(
-            least(window_end_ns, 1::BIGINT << 62), p.offset_ns, p.drift_ppb, p.reference_ns
-        ) + 1 AS end_ns
+        derive.recorded_ns(greatest(window_start_ns, -(1::BIGINT << 62)), p) - 1 AS start_ns,
+        derive.recorded_ns(least(window_end_ns, 1::BIGINT << 62), p) + 1 AS end_ns
     FROM store.thread AS t
     JOIN derive.process_clock AS p ON t.process_id = p.process_id
     WHERE window_start_ns IS NOT NULL
