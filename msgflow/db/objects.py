@@ -9,14 +9,14 @@ import hashlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import cache
-from graphlib import CycleError, TopologicalSorter
+from graphlib import TopologicalSorter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.db.finding import composed
 from msgflow.db.store_table import store_file, store_tables, table_views
 from msgflow.files.resources import resource_directory
-from msgflow.sql.header import Header, HeaderError, read
+from msgflow.sql.header import Header, read
 from msgflow.sql.quoting import identifier, literal
 from msgflow.version import __version__
 
@@ -59,10 +59,7 @@ def completed(header: Header) -> Header:
     if all(column.type for column in header.columns):
         return header
     declared = store_tables()[header.name.partition(".")[2]].columns
-    try:
-        columns = [column if column.type else declared[column.name] for column in header.columns]
-    except KeyError as error:
-        raise HeaderError(f"{header.path}: store has no column {error} of that table") from None
+    columns = (column if column.type else declared[column.name] for column in header.columns)
     return replace(header, columns=tuple(columns))
 
 
@@ -70,10 +67,7 @@ def sort(headers: Iterable[Header]) -> tuple[Header, ...]:
     """Order objects so that each comes after those that it needs; ties by name."""
     by_name = {header.name: header for header in headers}
     sorter = TopologicalSorter({name: sources(by_name, name) for name in sorted(by_name)})
-    try:
-        return tuple(by_name[name] for name in sorter.static_order())
-    except CycleError as error:
-        raise ValueError(f"objects need each other: {error.args[1]}") from error
+    return tuple(by_name[name] for name in sorter.static_order())
 
 
 def sources(by_name: Mapping[str, Header], name: str) -> list[str]:

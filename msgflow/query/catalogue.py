@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.files.resources import resource_directory
-from msgflow.sql.header import Header, HeaderError, read
+from msgflow.sql.header import Header, read
 from msgflow.sql.value import parse_text
 from msgflow.text.name_suggestions import nearest
 
@@ -95,11 +95,9 @@ def _header(name: str) -> Header:
     if base is not None:
         value = name.removeprefix(f"{base}-")
         variants = _header(base).variants
-        own = [each for each in variants if value in (*each.choices, each.name)]
-        if not own:
-            raise HeaderError(f"{header.path}: {base} has no such variant")
-        words = f" {value}" if own[0].choices else ""
-        header = replace(header, chosen=f"{base} --{own[0].name}{words}", variants=variants)
+        own = next(each for each in variants if value in (*each.choices, each.name))
+        words = f" {value}" if own.choices else ""
+        header = replace(header, chosen=f"{base} --{own.name}{words}", variants=variants)
     return replace(
         header, is_command=(base or name) in COMMANDS, params=(*header.variants, *header.params)
     )

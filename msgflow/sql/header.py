@@ -371,17 +371,14 @@ def _declared(
     key: str, fields: Sequence[_Field], read_value: Callable[[str], Iterable[_Item]], path: Path
 ) -> tuple[_Item, ...]:
     """Return what all fields of a key declare."""
-    items: dict[str, _Item] = {}
+    items: list[_Item] = []
     for field in fields:
         if field.key == key:
             try:
-                for item in read_value(field.value):
-                    if item.name in items:
-                        raise ValueError(f"{item.name!r} stands twice")
-                    items[item.name] = item
+                items += read_value(field.value)
             except ValueError as error:
                 raise _error(path, field.line, str(error)) from None
-    return tuple(items.values())
+    return tuple(items)
 
 
 def _params(known: Mapping[str, Param], text: str) -> list[Param]:

@@ -136,5 +136,5 @@ def test_a_header_may_name_columns_of_its_table() -> None:
 def test_a_header_names_no_column_that_the_table_lacks() -> None:
     text = "-- description: Takes.\n-- column: taken_us\nSELECT 1\n"
     header = parse(text, resource_directory("schema") / "public" / "take.sql")
-    with pytest.raises(ValueError, match="store has no column 'taken_us'"):
+    with pytest.raises(KeyError, match="taken_us"):
         objects.completed(header)

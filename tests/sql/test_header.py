@@ -135,9 +135,7 @@ def test_a_macro_keeps_its_whole_statement() -> None:
         ("-- param: a", "example.sql:3: expected '-- param: name TYPE"),
         ("-- param: a BIGINT = 1 one space", "expected '-- param: name TYPE"),
         ("-- param: a BIGINT = one  Default", "'one' is not NULL, TRUE, FALSE, a number"),
-        ("-- param: a BIGINT  x\n-- param: a BIGINT  y", "'a' stands twice"),
         ("-- column: a-b", "example.sql:3: expected '-- column: name TYPE [unit]"),
-        ("-- column: a BIGINT  x\n-- column: a BIGINT  y", "'a' stands twice"),
     ],
 )
 def test_a_bad_line_is_named(line: str, message: str) -> None:
@@ -198,6 +196,8 @@ def test_an_incomplete_file_is_refused(text: str, message: str) -> None:
         ("-- param: a BIGINT {1..9} = 10  x", "the default 10 is more than 9"),
         ("-- param: a VARCHAR {1..}  x", "only an integer has a minimum"),
         ("-- note: moon", "note 'moon' is not one of callbacks"),
+        ("-- param: a BIGINT  x\n-- param: a BIGINT  y", "'a' stands twice"),
+        ("-- column: a BIGINT  x\n-- column: a BIGINT  y", "'a' stands twice"),
         ("-- brief: a", "the header names a column that there is not: 'a'"),
         ("-- zero: a", "the header names a column that there is not: 'a'"),
     ],

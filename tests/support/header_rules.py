@@ -38,7 +38,9 @@ def faults(text: str, header: Header) -> Iterator[str]:
         yield f"a file says only that its kind is 'inline', not {header.kind!r}"
     if header.note not in {None, *NOTES}:
         yield f"note {header.note!r} is not one of {', '.join(sorted(NOTES))}"
-    columns = {column.name for column in header.columns}
+    columns = [column.name for column in header.columns]
+    for names in ([param.name for param in header.params], columns):
+        yield from (f"{name!r} stands twice" for name, count in Counter(names).items() if count > 1)
     one = [name for name in (header.slowest, header.zero) if name is not None]
     for name in (*header.brief, *header.answer, *header.heading, *one):
         if name not in columns:
