@@ -21,14 +21,12 @@ from msgflow.trace.ctf.clock import GIGA, Clock
 from msgflow.trace.ctf.packet_index import DiscardCounters
 from msgflow.trace.ctf.trace_info import description
 from msgflow.trace.metadata_frame import MetadataKind, kind_of
-from msgflow.trace.model import PACKET, EventBatch, Progress, TraceInfo
+from msgflow.trace.model import PACKET, EventBatch, Progress, TraceInfo, TraceLocation
 from msgflow.trace.time_base import on_one_base
-from msgflow.trace.trace_set import Report, TraceSet
+from msgflow.trace.trace_set import Batches, Report, TraceSet, Wanted
 
 if TYPE_CHECKING:
     from msgflow.trace.archived_traces import Unpacked
-    from msgflow.trace.model import TraceLocation
-    from msgflow.trace.trace_set import Batches, Wanted
 
 # Babeltrace orders by times that it rounds, where a clock does not count nanoseconds.
 _ROUNDING_NS = 1000

@@ -11,19 +11,17 @@ from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
 from msgflow.trace import archive
-from msgflow.trace.model import Progress
+from msgflow.trace.model import Damage, EventBatch, Progress, TraceInfo
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
     from msgflow.trace.archived_traces import Unpacked
-    from msgflow.trace.model import Damage, EventBatch, TraceInfo
-
-    Wanted = Mapping[str, pa.Schema | None] | None
-    Batches = Generator[EventBatch, None, None]
 
 DEFAULT_BATCH_ROWS = 65_536
 
+Wanted = Mapping[str, "pa.Schema | None"] | None
+Batches = Generator[EventBatch, None, None]
 Report = Callable[[Progress], None]
 """What a reader calls now and then to say how far it has come."""
 

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from msgflow.trace.ctf.field_types import MetadataError
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+from msgflow.trace.numpy_arrow import Integers
 
 GIGA = 1_000_000_000
 LATEST_NS = 1 << 62
@@ -56,10 +54,8 @@ class Clock:
         cycles = value + self.offset_cycles
         return cycles * GIGA // self.frequency + self.offset_seconds * GIGA
 
-    def to_ns_array(self, values: NDArray[np.uint64]) -> NDArray[np.int64]:
+    def to_ns_array(self, values: NDArray[np.uint64]) -> Integers:
         """Return the times of many values; those beyond 64 bits wrap round."""
-        import numpy as np
-
         origin = self.offset_seconds * GIGA
         if self.frequency == GIGA:
             return (values + np.uint64((origin + self.offset_cycles) % 2**64)).view(np.int64)

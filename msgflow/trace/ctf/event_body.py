@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.declarations import EventClass, StreamClass
 from msgflow.trace.ctf.field_types import BYTE, FieldError, Scope
 from msgflow.trace.ctf.layout import (
     DynamicError,
@@ -17,9 +18,6 @@ from msgflow.trace.ctf.layout import (
     lay_out,
     without_variant,
 )
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.declarations import EventClass, StreamClass
 
 _WIDTHS = {8, 16, 32, 64}
 

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.declarations import StreamClass
 from msgflow.trace.ctf.field_types import BYTE, Role, Scope
 from msgflow.trace.ctf.layout import DynamicError, Leaf, lay_out
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.declarations import StreamClass
 
 
 @dataclass(frozen=True)

@@ -7,25 +7,18 @@ large ones are cut into pieces that are read like packets.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Collection, Generator, Iterator, Sequence
+from collections.abc import Collection, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from msgflow.trace.ctf.events import Events, events_of, joined, say_nothing
-from msgflow.trace.ctf.packet_memory import Loader
-from msgflow.trace.ctf.packet_order import PacketEvents
-from msgflow.trace.ctf.stream_layout import GAP
-from msgflow.trace.numpy_arrow import distinct
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.packet_memory import Memory
-    from msgflow.trace.ctf.packet_order import Entry
-    from msgflow.trace.ctf.stream_layout import StreamLayout
+from msgflow.trace.ctf.packet_memory import Loader, Memory
+from msgflow.trace.ctf.packet_order import Entry, OnDamage, PacketEvents
+from msgflow.trace.ctf.stream_layout import GAP, StreamLayout
+from msgflow.trace.numpy_arrow import Integers, Truths, distinct
 
 _NEVER_NS = 1 << 64
 MOST_EVENTS = 1 << 18
@@ -43,9 +36,9 @@ class Batch:
     bases: list[int]  # where they lie in memory; `Entry.base` may already belong to a later batch
     packets: list[PacketEvents]  # summaries of the packets that were in no batch before
     events: Events  # those in these packets
-    rows: NDArray[np.int64]  # which of them are of the batch, in order
+    rows: Integers  # which of them are of the batch, in order
     cpus: NDArray[np.int32]  # the CPU of each packet
-    has_cpu: NDArray[np.bool_] | None  # which packets have one; None if all have
+    has_cpu: Truths | None  # which packets have one; None if all have
 
 
 @dataclass(frozen=True)
@@ -54,19 +47,16 @@ class _Loaded:
 
     memory: Memory
     entries: list[Entry]
-    is_new: NDArray[np.bool_]  # which of the packets were not there before
+    is_new: Truths  # which of the packets were not there before
     events: Events
-    counts: NDArray[np.int64]  # events of each packet
+    counts: Integers  # events of each packet
     # Times to order the events by: none is before `Entry.order_ns`, where batches are cut. The
     # order would differ with their size.
-    rank_ns: NDArray[np.int64]
+    rank_ns: Integers
 
 
 def ordered_batches(
-    entries: Sequence[Entry],
-    size: int,
-    report: Callable[[Entry, int, str], None],
-    whole: Collection[StreamLayout] = (),
+    entries: Sequence[Entry], size: int, report: OnDamage, whole: Collection[StreamLayout] = ()
 ) -> Generator[Batch, None, None]:
     """Read packets, about `size` bytes at once, and yield their events in order of time.
 
@@ -108,12 +98,7 @@ def ordered_batches(
         loader.close()
 
 
-def _load(
-    loader: Loader,
-    held: Sequence[Entry],
-    new: Sequence[Entry],
-    report: Callable[[Entry, int, str], None],
-) -> _Loaded:
+def _load(loader: Loader, held: Sequence[Entry], new: Sequence[Entry], report: OnDamage) -> _Loaded:
     entries = sorted([*held, *new], key=lambda entry: entry.place)
     is_held = set(map(id, held))
 
@@ -137,9 +122,7 @@ def _load(
     return _Loaded(loader.memory, entries, is_new, events, counts, rank_ns)
 
 
-def _ranks(
-    entries: Sequence[Entry], counts: NDArray[np.int64], ts_ns: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _ranks(entries: Sequence[Entry], counts: Integers, ts_ns: Integers) -> Integers:
     begins = np.array([entry.order_ns for entry in entries], np.int64)
     filled = np.flatnonzero(counts)
     first = (np.cumsum(counts) - counts)[filled]
@@ -149,13 +132,13 @@ def _ranks(
     return np.maximum(ts_ns, np.repeat(begins, counts))
 
 
-def _order(loaded: _Loaded, are_cut: bool, since_ns: int, until_ns: int) -> NDArray[np.int64]:
+def _order(loaded: _Loaded, are_cut: bool, since_ns: int, until_ns: int) -> Integers:
     """Return the rows of the events before `until_ns` in the total order.
 
     Unless `are_cut`, held packets have events that are done: those before `since_ns`.
     """
     rank_ns = loaded.rank_ns
-    rows: NDArray[np.int64] | None = None
+    rows: Integers | None = None
     if not are_cut:
         waits = loaded.is_new[loaded.events.packets] | (rank_ns >= since_ns)
         rows = np.flatnonzero(waits)
@@ -168,9 +151,7 @@ def _order(loaded: _Loaded, are_cut: bool, since_ns: int, until_ns: int) -> NDAr
     return order
 
 
-def _parts(
-    loaded: _Loaded, packets: list[PacketEvents], order: NDArray[np.int64]
-) -> Iterator[Batch]:
+def _parts(loaded: _Loaded, packets: list[PacketEvents], order: Integers) -> Iterator[Batch]:
     """Yield what is loaded in parts: columns of all events of large packets take much memory."""
     bases = [entry.base for entry in loaded.entries]
     cpus = [entry.packet.header.cpu for entry in loaded.entries]
@@ -250,9 +231,7 @@ def _forget(entries: Sequence[Entry], held: Sequence[Entry]) -> None:
             entry.events = None
 
 
-def cut(
-    loader: Loader, entry: Entry, report: Callable[[Entry, int, str], None]
-) -> tuple[PacketEvents, list[Entry]] | None:
+def cut(loader: Loader, entry: Entry, report: OnDamage) -> tuple[PacketEvents, list[Entry]] | None:
     """Return a packet's times and counts, and its pieces in order of time.
 
     Its events are found once, for all pieces; `report` is called for damage. None says that the

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from msgflow.trace.ctf.event_body import EventBody, Kind
-from msgflow.trace.numpy_arrow import distinct
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.layout import OptionLayout, Part, VariantLayout
-    from msgflow.trace.ctf.packet_memory import Memory
+from msgflow.trace.ctf.layout import OptionLayout, Part, VariantLayout
+from msgflow.trace.ctf.packet_memory import Memory
+from msgflow.trace.numpy_arrow import Integers, Values, distinct
 
 _WIDEST_ROW = 256
 _WORD = 8
@@ -30,7 +26,7 @@ class FieldRows:
         self,
         body: EventBody,
         memory: Memory,
-        bodies: NDArray[np.int64],
+        bodies: Integers,
         wanted: Iterable[int],
         *,
         with_variant: bool = False,
@@ -44,14 +40,12 @@ class FieldRows:
         assert body.fields is not None
         self._fields = body.fields
         # Names of variants and options to the rows that have the option, its begins and layout.
-        self._options: dict[
-            tuple[str, ...], tuple[NDArray[np.int64], NDArray[np.int64], OptionLayout]
-        ] = {}
+        self._options: dict[tuple[str, ...], tuple[Integers, Integers, OptionLayout]] = {}
         self._memory = memory
         self._bodies = bodies
-        self._positions: dict[int, NDArray[np.int64]] = {}
-        self._counts: dict[int, NDArray[np.int64]] = {}
-        self._rows: NDArray[Any] | None = None
+        self._positions: dict[int, Integers] = {}
+        self._counts: dict[int, Integers] = {}
+        self._rows: Values | None = None
         self._first = 0
         self._offsets: tuple[int, ...] | None = None
         if body.variant is not None and with_variant:
@@ -69,7 +63,7 @@ class FieldRows:
                 table = np.array(body.offsets[number], np.int64)
                 self._positions[number] = bodies + table[residue]
 
-    def words(self, number: int, dtype: str) -> NDArray[Any]:
+    def words(self, number: int, dtype: str) -> Values:
         """Return the bytes at a field as this type, a value for each row."""
         if self._rows is not None and self._offsets is not None:
             at = self._offsets[number] - self._first
@@ -85,11 +79,11 @@ class FieldRows:
                 return self._rows.view(column)["word"]
         return self._memory.view(dtype)[self._position(number)]
 
-    def numbers(self, number: int) -> NDArray[Any]:
+    def numbers(self, number: int) -> Values:
         """Return the values of a field that is a number."""
         return self.words(number, self._fields[number].dtype)
 
-    def elements(self, number: int) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    def elements(self, number: int) -> tuple[Integers, Values]:
         """Return the elements of an array or sequence: offsets of the rows, and all elements."""
         field = self._fields[number]
         count = self._counts.get(number)
@@ -98,7 +92,7 @@ class FieldRows:
         offsets, at = _flat(self._position(number), count, field.width)
         return offsets, self._memory.view(field.dtype)[at]
 
-    def text(self, number: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+    def text(self, number: int) -> tuple[Integers, NDArray[np.uint8]]:
         """Return a text, cut at its first NUL: offsets of the rows, and all bytes."""
         offsets, content = self.elements(number)
         content = content.view(np.uint8)
@@ -110,7 +104,7 @@ class FieldRows:
         cut, at = _flat(offsets[:-1], lengths, 1)
         return cut, content[at]
 
-    def in_variant(self, path: tuple[str, ...]) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
+    def in_variant(self, path: tuple[str, ...]) -> tuple[Integers, Values] | None:
         """Return the rows that have a field of the variant, and its values; None if no row has it.
 
         The values of an array have a column for each element. The path is the names of the
@@ -123,7 +117,7 @@ class FieldRows:
                 return rows, _values(self._memory, at, part)
         return None
 
-    def _position(self, number: int) -> NDArray[np.int64]:
+    def _position(self, number: int) -> Integers:
         if self._offsets is not None:
             return self._bodies + self._offsets[number]
         return self._positions[number]
@@ -143,7 +137,7 @@ class FieldRows:
             width = max(last - first, 1)
             self._rows = self._memory.view(f"V{width}")[self._bodies + first]
 
-    def _follow(self, last: int) -> NDArray[np.int64]:
+    def _follow(self, last: int) -> Integers:
         """Find where fields begin, up to the field `last`, as places vary; return where it ends."""
         at = self._bodies
         for number, field in enumerate(self._fields[: last + 1]):
@@ -165,9 +159,9 @@ class FieldRows:
         self,
         path: tuple[str, ...],
         variant: VariantLayout,
-        rows: NDArray[np.int64],
-        due: NDArray[np.int64],
-        values: NDArray[Any],
+        rows: Integers,
+        due: Integers,
+        values: Values,
     ) -> None:
         """Find the rows of each option of a variant that is due at these bytes of memory."""
         present = distinct(values).tolist()
@@ -184,15 +178,15 @@ class FieldRows:
                 self._find_options(inner, option.variant, chosen, at + option.size, selected)
 
 
-def _values(memory: Memory, at: NDArray[np.int64], part: Part) -> NDArray[Any]:
+def _values(memory: Memory, at: Integers, part: Part) -> Values:
     places = at + part.offset
     if part.count is not None:
         places = places[:, np.newaxis] + np.arange(part.count) * part.width
-    values: NDArray[Any] = memory.view(part.dtype)[places]
+    values: Values = memory.view(part.dtype)[places]
     return values
 
 
-def text_lengths(memory: Memory, begins: NDArray[np.int64]) -> NDArray[np.int64]:
+def text_lengths(memory: Memory, begins: Integers) -> Integers:
     """Return the number of bytes in front of the next NUL; there must be one."""
     lengths = np.zeros(begins.size, np.int64)
     at = begins
@@ -216,9 +210,7 @@ def text_lengths(memory: Memory, begins: NDArray[np.int64]) -> NDArray[np.int64]
     return lengths
 
 
-def _flat(
-    begins: NDArray[np.int64], counts: NDArray[np.int64], width: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _flat(begins: Integers, counts: Integers, width: int) -> tuple[Integers, Integers]:
     """Return offsets of rows among all their elements, and where each element begins."""
     offsets = np.zeros(counts.size + 1, np.int64)
     np.cumsum(counts, out=offsets[1:])

@@ -33,10 +33,7 @@ class Leaf:
 
 
 def lay_out(
-    declared: ctf.Type,
-    position: int,
-    leaves: list[Leaf] | None = None,
-    path: tuple[str, ...] = (),
+    declared: ctf.Type, position: int, leaves: list[Leaf] | None = None, path: tuple[str, ...] = ()
 ) -> int:
     """Return the bit at which a field ends that begins at `position` or, aligned, behind it.
 

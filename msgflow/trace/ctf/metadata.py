@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import json_metadata, tsdl
+from msgflow.trace.ctf.declarations import TraceClass
 from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.metadata_frame import MetadataKind, text_of
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.declarations import TraceClass
 
 
 def read(directory: Path) -> TraceClass:

@@ -6,16 +6,13 @@ import os
 import weakref
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from msgflow.trace.ctf.packet_order import Entry
 from msgflow.trace.ctf.stream_layout import GAP
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.packet_order import Entry
+from msgflow.trace.numpy_arrow import Values
 
 PADDING = 2 * GAP
 """Bytes behind all packets."""
@@ -30,9 +27,9 @@ class Memory:
     def __init__(self, data: bytearray) -> None:
         self.data = data  # for Python
         self.bytes: NDArray[np.uint8] = np.frombuffer(self.data, np.uint8)  # for numpy
-        self._views: dict[str, NDArray[Any]] = {}
+        self._views: dict[str, Values] = {}
 
-    def view(self, dtype: str) -> NDArray[Any]:
+    def view(self, dtype: str) -> Values:
         """Return an array whose n-th element begins at the n-th byte."""
         found = self._views.get(dtype)
         if found is None:

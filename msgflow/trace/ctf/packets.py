@@ -8,15 +8,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf import packet_index
 from msgflow.trace.ctf.field_types import BYTE, FieldError
+from msgflow.trace.ctf.packet_header import HeaderReader, PacketHeader
+from msgflow.trace.ctf.stream_layout import StreamLayout
 from msgflow.trace.regular_file import UnsuitableFileError
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.packet_header import HeaderReader, PacketHeader
-    from msgflow.trace.ctf.stream_layout import StreamLayout
 
 _CHUNK = 1 << 20
 # Buffers of tracers are far smaller; a packet is loaded as a whole.
@@ -42,9 +39,11 @@ class Packet:
     is_cut: bool = False  # the file ends before the packet does
 
 
-def packets_of(
-    path: Path, reader: HeaderReader, report: Callable[[Path, int, int, str], None]
-) -> list[Packet]:
+OnFileDamage = Callable[[Path, int, int, str], None]
+"""What gets damage: the file, the number of the packet, where in the file (in bytes), a message."""
+
+
+def packets_of(path: Path, reader: HeaderReader, report: OnFileDamage) -> list[Packet]:
     """Return the packets of a file in its order.
 
     `report` gets all that is wrong: the file, the number of the packet, the offset in bytes and a
@@ -62,11 +61,7 @@ def packets_of(
 
 class _PacketFinder:
     def __init__(
-        self,
-        path: Path,
-        descriptor: int,
-        reader: HeaderReader,
-        report: Callable[[Path, int, int, str], None],
+        self, path: Path, descriptor: int, reader: HeaderReader, report: OnFileDamage
     ) -> None:
         self._path = path
         self._descriptor = descriptor
@@ -288,7 +283,7 @@ def streams_of(
     files: Sequence[Path],
     reader: HeaderReader,
     layouts: dict[int, StreamLayout],
-    report: Callable[[Path, int, int, str], None],
+    report: OnFileDamage,
 ) -> list[Stream]:
     """Return the streams of a trace, in order of class and instance.
 

@@ -5,35 +5,27 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
+from msgflow.trace.archived_traces import Unpacked
 from msgflow.trace.ctf import metadata
 from msgflow.trace.ctf.batches import Iteration
 from msgflow.trace.ctf.event_positions import BEYOND_END
 from msgflow.trace.ctf.field_types import MetadataError
-from msgflow.trace.ctf.losses import LossCounter
+from msgflow.trace.ctf.losses import Continuation, LossCounter
 from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.packet_index import orphans
-from msgflow.trace.ctf.packet_order import entries_of
+from msgflow.trace.ctf.packet_order import Entry, entries_of
 from msgflow.trace.ctf.packet_times import begins_of
-from msgflow.trace.ctf.packets import streams_of
+from msgflow.trace.ctf.packets import Packet, Stream, streams_of
 from msgflow.trace.ctf.stream_layout import StreamLayout
 from msgflow.trace.ctf.trace_info import corrected, describe
 from msgflow.trace.discovery import irregular_files, stream_files
 from msgflow.trace.metadata_frame import FILE_NAME
-from msgflow.trace.model import Damage, TraceInfo
+from msgflow.trace.model import Damage, TraceInfo, TraceLocation
 from msgflow.trace.regular_file import unreadable_error
 from msgflow.trace.time_base import on_one_base
-from msgflow.trace.trace_set import TraceSet
-
-if TYPE_CHECKING:
-    from msgflow.trace.archived_traces import Unpacked
-    from msgflow.trace.ctf.losses import Continuation
-    from msgflow.trace.ctf.packet_order import Entry
-    from msgflow.trace.ctf.packets import Packet, Stream
-    from msgflow.trace.model import TraceLocation
-    from msgflow.trace.trace_set import Batches, Report, Wanted
+from msgflow.trace.trace_set import Batches, Report, TraceSet, Wanted
 
 
 class CtfTraceSet(TraceSet):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -18,17 +18,13 @@ from msgflow.trace.ctf.arrow import (
     text_array,
 )
 from msgflow.trace.ctf.event_body import Kind
+from msgflow.trace.ctf.event_order import Batch
 from msgflow.trace.ctf.field_columns import FieldRows
+from msgflow.trace.ctf.field_reader import EventReader
 from msgflow.trace.ctf.field_types import Scope, Structure
-from msgflow.trace.numpy_arrow import texts_to_arrow, to_arrow, to_numpy
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.event_order import Batch
-    from msgflow.trace.ctf.field_reader import EventReader
-    from msgflow.trace.ctf.packet_memory import Memory
-    from msgflow.trace.ctf.stream_layout import ClassLayout, StreamLayout
+from msgflow.trace.ctf.packet_memory import Memory
+from msgflow.trace.ctf.stream_layout import ClassLayout, StreamLayout
+from msgflow.trace.numpy_arrow import Integers, Values, texts_to_arrow, to_arrow, to_numpy
 
 _LEADING = 4
 """So many columns are not read from fields: id, time, trace and CPU."""
@@ -81,7 +77,7 @@ def make_plan(stream: StreamLayout, layout: ClassLayout, wanted: pa.Schema) -> C
 def build_batch(
     plan: ClassPlan,
     batch: Batch,
-    rows: NDArray[np.int64],
+    rows: Integers,
     first_id: int,
     reader_at: Callable[[int, int], tuple[EventReader, int]],
 ) -> pa.RecordBatch:
@@ -116,7 +112,7 @@ def build_batch(
 
 
 def _gathered(
-    plan: ClassPlan, memory: Memory, bodies: NDArray[np.int64]
+    plan: ClassPlan, memory: Memory, bodies: Integers
 ) -> Callable[[Source, pa.DataType], pa.Array]:
     """Return what gathers a column from memory, for all events at once."""
     fields = plan.layout.body.fields or ()
@@ -143,7 +139,7 @@ def _gathered(
     return array
 
 
-def _short_names(content: NDArray[Any]) -> pa.Array:
+def _short_names(content: Values) -> pa.Array:
     """Return names that end at their first NUL; few of them differ.
 
     `content` has the bytes of each name as one item of numpy's type `V`.

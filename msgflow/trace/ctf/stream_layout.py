@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msgflow.trace.ctf.clock import Clock
+from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
 from msgflow.trace.ctf.event_body import EventBody, compile_body
 from msgflow.trace.ctf.event_header import EventHeader, Form, compile_header
 from msgflow.trace.ctf.field_reader import EventReader
 from msgflow.trace.ctf.field_types import BYTE, FieldError, Type, aligned, parts
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.clock import Clock
-    from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
+from msgflow.trace.numpy_arrow import Integers
 
 GAP = 64
 """Bytes of ones that follow a packet in memory; packets begin at multiples of it."""
@@ -126,7 +122,7 @@ class StreamLayout:
         return sizes
 
     @cached_property
-    def size_table(self) -> NDArray[np.int64] | None:
+    def size_table(self) -> Integers | None:
         """`sizes_by_selector` as an array by selector and residue, 0 where they have none.
 
         The last row has none: larger selectors are looked up there. None if there are too many

@@ -5,18 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
+from msgflow.trace.ctf.clock import Clock
+from msgflow.trace.ctf.declarations import TraceClass
+from msgflow.trace.ctf.field_types import Structure
 from msgflow.trace.ctf.packet_times import end_of
+from msgflow.trace.ctf.packets import Stream
 from msgflow.trace.model import TraceInfo
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.clock import Clock
-    from msgflow.trace.ctf.declarations import TraceClass
-    from msgflow.trace.ctf.field_types import Structure
-    from msgflow.trace.ctf.packets import Stream
-
 
 _PROCESS_CONTEXT = {"vpid", "vtid"}
 

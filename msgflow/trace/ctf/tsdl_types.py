@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.field_types import BYTE, MetadataError, Reference, Scope, integer_of
-from msgflow.trace.ctf.tsdl_tokens import TokenStream
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.tsdl_tokens import Token
+from msgflow.trace.ctf.tsdl_tokens import Token, TokenStream
 
 Labels = dict[str, tuple[tuple[int, int], ...]]
 Value = int | str
