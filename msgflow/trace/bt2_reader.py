@@ -9,24 +9,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pyarrow as pa
 
 from msgflow.errors import TraceError
 from msgflow.trace import bt2_library, columns
+from msgflow.trace.archive import Unpacked
 from msgflow.trace.bt2_fields import schema_of, value_of
 from msgflow.trace.columns import COMMON_SCHEMA, PACKET_SCHEMA
-from msgflow.trace.ctf.clock import GIGA, Clock
+from msgflow.trace.ctf.declarations import GIGA, Clock
 from msgflow.trace.ctf.packet_index import DiscardCounters
 from msgflow.trace.ctf.trace_info import description
 from msgflow.trace.metadata_frame import MetadataKind, kind_of
 from msgflow.trace.model import PACKET, EventBatch, Progress, TraceInfo, TraceLocation
 from msgflow.trace.time_base import on_one_base
 from msgflow.trace.trace_set import Batches, Report, TraceSet, Wanted
-
-if TYPE_CHECKING:
-    from msgflow.trace.archived_traces import Unpacked
 
 # Babeltrace orders by times that it rounds, where a clock does not count nanoseconds.
 _ROUNDING_NS = 1000
@@ -38,15 +36,13 @@ _ADDRESS = re.compile(r"[\w-]*addr=0x[0-9a-f]+,?")
 class Bt2TraceSet(TraceSet):
     """Traces read through Babeltrace 2."""
 
-    def __init__(
-        self, locations: Sequence[TraceLocation], archives: Unpacked | None = None
-    ) -> None:
+    def __init__(self, locations: Sequence[TraceLocation], unpacked: Unpacked) -> None:
         """Describe the traces; raises TraceError where bt2 is missing or cannot open one."""
-        super().__init__(archives)
+        super().__init__(unpacked)
         self._bt2 = bt2_library.load()
         described = [describe(self._bt2, at.path, index) for index, at in enumerate(locations)]
         self._located = on_one_base([info for info, _ in described], {})
-        self.traces = tuple(replace(info, path=self.shown(info.path)) for info in self._located)
+        self.traces = tuple(replace(info, path=unpacked.shown(info.path)) for info in self._located)
         self._declared = columns.merged_schemas(e for _, events in described for e in events)
 
     def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.trace.archive import is_archive, shown
+from msgflow.trace.archive import Unpacked
+from msgflow.trace.ctf.losses import Continuation
 from msgflow.trace.discovery import discover
-
-if TYPE_CHECKING:
-    from msgflow.trace.archived_traces import Unpacked
-    from msgflow.trace.ctf.losses import Continuation
-    from msgflow.trace.model import TraceLocation
-    from msgflow.trace.trace_set import TraceSet
+from msgflow.trace.trace_set import TraceSet
 
 READERS = ("auto", "msgflow", "bt2")
 
@@ -42,32 +37,17 @@ def open(
     """
     if reader not in READERS:
         raise UsageError(f"there is no reader {reader!r}", hint=f"use one of {', '.join(READERS)}")
-    if not any(is_archive(Path(path)) for path in paths):
-        return _open(discover(paths), None, reader, strict, after)
-    from msgflow.trace.archived_traces import Unpacked
-
     unpacked = Unpacked(paths)
     try:
         with unpacked.explained():
-            locations = discover(unpacked.paths)
-            locations.sort(key=lambda at: shown(at.path, unpacked.archives) or at.path)
-            return _open(locations, unpacked, reader, strict, after)
+            locations = sorted(discover(unpacked.paths), key=lambda at: unpacked.shown(at.path))
+            if reader == "bt2":
+                from msgflow.trace.bt2_reader import Bt2TraceSet
+
+                return Bt2TraceSet(locations, unpacked)
+            from msgflow.trace.ctf.reader import CtfTraceSet
+
+            return CtfTraceSet(locations, unpacked, strict=strict, after=after)
     except BaseException:
         unpacked.remove()
         raise
-
-
-def _open(
-    locations: Sequence[TraceLocation],
-    archives: Unpacked | None,
-    reader: str,
-    strict: bool,
-    after: Continuation | None,
-) -> TraceSet:
-    if reader == "bt2":
-        from msgflow.trace.bt2_reader import Bt2TraceSet
-
-        return Bt2TraceSet(locations, archives)
-    from msgflow.trace.ctf.reader import CtfTraceSet
-
-    return CtfTraceSet(locations, archives=archives, strict=strict, after=after)

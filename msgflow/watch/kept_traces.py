@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from msgflow.trace import PACKET, EventBatch, TraceSet
+from msgflow.trace.archive import Unpacked
 from msgflow.trace.numpy_arrow import to_numpy
 from msgflow.watch.kept_chunk import joined, placed, with_column
 
@@ -26,7 +27,7 @@ class KeptTraces(TraceSet):
 
     def __init__(self, lasting: Sequence[KeptChunk], chunks: Sequence[KeptChunk]) -> None:
         """Join them."""
-        super().__init__()
+        super().__init__(Unpacked([]))
         self._parts = (*lasting, *chunks)
         traces: list[TraceInfo] = []
         # Of each part: its trace index -> that in the set.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from msgflow.trace.ctf.clock import Clock
+from msgflow.trace.ctf.declarations import Clock
 from msgflow.trace.ctf.event_header import Form, Place
 from msgflow.trace.ctf.event_positions import find_positions
 from msgflow.trace.ctf.field_reader import EventReader

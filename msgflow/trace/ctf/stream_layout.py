@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from msgflow.trace.ctf.clock import Clock
-from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
+from msgflow.trace.ctf.declarations import Clock, EventClass, StreamClass, TraceClass
 from msgflow.trace.ctf.event_body import EventBody, compile_body
 from msgflow.trace.ctf.event_header import EventHeader, Form, compile_header
 from msgflow.trace.ctf.field_reader import EventReader

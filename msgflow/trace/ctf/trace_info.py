@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from msgflow.errors import TraceError
-from msgflow.trace.ctf.clock import Clock
-from msgflow.trace.ctf.declarations import TraceClass
+from msgflow.trace.ctf.declarations import Clock, TraceClass
 from msgflow.trace.ctf.field_types import Structure
 from msgflow.trace.ctf.packet_times import end_of
 from msgflow.trace.ctf.packets import Stream

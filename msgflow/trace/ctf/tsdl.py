@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, replace
 from uuid import UUID
 
 from msgflow.trace.ctf import field_types as ctf
-from msgflow.trace.ctf.clock import Clock
-from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
+from msgflow.trace.ctf.declarations import Clock, EventClass, StreamClass, TraceClass
 from msgflow.trace.ctf.field_types import (
     MetadataError,
     Reference,
