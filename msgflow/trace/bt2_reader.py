@@ -19,7 +19,7 @@ from msgflow.trace.archive import Unpacked
 from msgflow.trace.bt2_fields import schema_of, value_of
 from msgflow.trace.columns import COMMON_SCHEMA, PACKET_SCHEMA
 from msgflow.trace.ctf.declarations import GIGA, Clock
-from msgflow.trace.ctf.packet_index import DiscardCounters
+from msgflow.trace.ctf.packet_index import first_counter
 from msgflow.trace.ctf.trace_info import description
 from msgflow.trace.metadata_frame import MetadataKind, kind_of
 from msgflow.trace.model import PACKET, EventBatch, Progress, TraceInfo, TraceLocation
@@ -83,7 +83,8 @@ class _Reading:
     def __post_init__(self) -> None:
         self._streams: dict[int, _Stream] = {}
         self._first_traces: dict[Any, int] = {}
-        self._counters = DiscardCounters()
+        # Of lost events, by recording: they go on in its next directory.
+        self._counters: Counter[tuple[Any, ...]] = Counter()
         self._simultaneous: list[Any] = []
         self._paths: dict[int, tuple[Any, Any]] = {}
         self._rows: dict[str, list[list[Any]]] = {}
@@ -163,10 +164,7 @@ class _Reading:
             self.duplicates += 1
             return None
         stream.packet_count += 1
-        discarded: int | None = 0
-        if stream.discards is not None:
-            path, count = self.traces[trace].path, stream.discards.count
-            discarded = self._counters.rise(stream.recording, path, count)
+        discarded = 0 if stream.discards is None else self._discarded(stream)
         if stream.lost_packets != 0 and discarded != 0:
             discarded = None  # nothing tells which of them were in the lost packets
         return {
@@ -183,6 +181,21 @@ class _Reading:
             "lost_packet_count": stream.lost_packets,
             "is_numbered": False,
         }
+
+    def _discarded(self, stream: _Stream) -> int | None:
+        """Return how many events were lost before a packet; None where nothing tells it."""
+        before = self._counters[stream.recording]
+        lost: int | None = stream.discards.count
+        # Of the first packet of a directory, Babeltrace does not tell it.
+        if lost is None:
+            trace, class_id, instance_id = stream.key
+            counter = first_counter(self.traces[trace].path, class_id, instance_id)
+            if counter is None:
+                return None
+            lost = counter - before if counter >= before else counter
+            before = counter - lost
+        self._counters[stream.recording] = before + lost
+        return lost
 
     def _number(self) -> None:
         """Number the events of one time in order of trace and stream, and keep what is wanted."""
@@ -294,7 +307,7 @@ def describe(bt2: Any, path: Path, index: int) -> tuple[TraceInfo, list[Any]]:
         path,
         index,
         uuid=None if trace.uuid is None else str(trace.uuid),
-        environment={str(name): str(value) for name, value in trace.environment.items()},
+        environment=dict(trace.environment),
         clock=clock_of(streams[0].default_clock_class),
         begins=[int(span["begin"]) for span in ranges],
         ends=[int(span["end"]) for span in ranges],
