@@ -175,7 +175,7 @@ def _sources(
     layout: ClassLayout, scope: Scope, structure: Structure, columns: Iterable[pa.Field]
 ) -> list[Source | None]:
     numbers: dict[tuple[str, ...], int] = {
-        (field.name,): number
+        field.path: number
         for number, field in enumerate(layout.body.fields or ())
         if field.scope is scope
     }
