@@ -21,7 +21,7 @@ from msgflow.trace.columns import COMMON_SCHEMA, PACKET_SCHEMA
 from msgflow.trace.ctf.declarations import GIGA, Clock
 from msgflow.trace.ctf.packet_index import first_counter
 from msgflow.trace.ctf.trace_info import description
-from msgflow.trace.metadata_frame import MetadataKind, kind_of
+from msgflow.trace.metadata_frame import MetadataKind, text_of
 from msgflow.trace.model import PACKET, EventBatch, Progress, TraceInfo, TraceLocation
 from msgflow.trace.time_base import on_one_base
 from msgflow.trace.trace_set import Batches, Report, TraceSet, Wanted
@@ -281,7 +281,7 @@ def parameters_of(path: Path, place: int = 0, correction_ns: int = 0) -> dict[st
 
 def describe(bt2: Any, path: Path, index: int) -> tuple[TraceInfo, list[Any]]:
     """Describe one trace, with names and payload schemas of its events."""
-    if kind_of(path) is MetadataKind.JSON and bt2.__version__ < "2.1":
+    if text_of(path)[0] is MetadataKind.JSON and bt2.__version__ < "2.1":
         raise TraceError(
             "the trace is CTF 2, which needs babeltrace2 2.1 or newer, here is "
             f"{bt2.__version__} — {path}",

@@ -159,7 +159,7 @@ def _first_stream(directory: Path, names: Sequence[str]) -> list[Path]:
 
 def _locate(directory: Path) -> TraceLocation:
     try:
-        metadata_frame.kind_of(directory)
+        metadata_frame.text_of(directory)
         files = stream_files(directory)
         size = sum(file.stat().st_size for file in files)
     except OSError as error:

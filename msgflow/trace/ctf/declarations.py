@@ -96,10 +96,6 @@ class StreamClass:
     events: dict[int, EventClass] = field(default_factory=dict)
     has_time: bool = True  # its events have times; if not, `clock` only counts packets
 
-    def give_order(self) -> None:
-        """Prepare for packets that are ordered by numbers in place of times."""
-        self.clock, self.has_time = Clock(), False
-
 
 @dataclass(eq=False)
 class TraceClass:

@@ -68,11 +68,6 @@ class EventHeader:
     # Size of the time stamps that are not whole clock values, None if all are.
     narrow_bits: int | None
 
-    @property
-    def largest_size(self) -> int:
-        """Bytes of the longest form."""
-        return max(size for form in self.forms for size in form.sizes)
-
 
 def compile_header(stream: StreamClass, residues: int) -> EventHeader | None:
     """Compile the layout of headers; None if they must be read field by field.

@@ -65,16 +65,9 @@ class FieldRows:
         """Return the bytes at a field as this type, a value for each row."""
         if self._rows is not None and self._offsets is not None:
             at = self._offsets[number] - self._first
-            if at + np.dtype(dtype).itemsize <= self._rows.dtype.itemsize:
-                column = np.dtype(
-                    {
-                        "names": ["word"],
-                        "formats": [dtype],
-                        "offsets": [at],
-                        "itemsize": self._rows.dtype.itemsize,
-                    }
-                )
-                return self._rows.view(column)["word"]
+            width = self._rows.itemsize
+            if at + np.dtype(dtype).itemsize <= width:
+                return np.ndarray(self._rows.shape, dtype, self._rows, at, (width,))
         return self._memory.view(dtype)[self._position(number)]
 
     def numbers(self, number: int) -> Values:

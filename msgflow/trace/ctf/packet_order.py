@@ -104,7 +104,6 @@ def entries_of(
             owners.setdefault((uuid, stream.class_id, stream.instance, begin), stream.trace_index)
 
     entries = []
-    counter.enter_part()
     copies = 0
     seen: dict[tuple[object, ...], Packet] = {}
     repeated: dict[int, int] = {}

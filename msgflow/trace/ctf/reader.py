@@ -10,7 +10,7 @@ from msgflow.errors import TraceError
 from msgflow.trace.archive import Unpacked
 from msgflow.trace.ctf import json_metadata, tsdl
 from msgflow.trace.ctf.batches import Iteration
-from msgflow.trace.ctf.declarations import TraceClass
+from msgflow.trace.ctf.declarations import Clock, TraceClass
 from msgflow.trace.ctf.event_positions import BEYOND_END
 from msgflow.trace.ctf.field_types import MetadataError
 from msgflow.trace.ctf.losses import Continuation, LossCounter
@@ -70,7 +70,8 @@ class CtfTraceSet(TraceSet):
             return TraceInfo(index, self.unpacked.shown(path))
         if all(stream_class.clock is None for stream_class in declared.streams.values()):
             for stream_class in declared.streams.values():
-                stream_class.give_order()
+                # Its packets are ordered by numbers in place of times.
+                stream_class.clock, stream_class.has_time = Clock(), False
         layouts = {}
         for stream_class in declared.streams.values():
             number = sum(len(layout.classes) for layout in self._layouts)

@@ -10,13 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from msgflow.trace.columns import COMMON_SCHEMA, first_inner_value, paths_of, to_array
-from msgflow.trace.ctf.arrow import (
-    declared_schema,
-    list_array,
-    number_array,
-    scattered_array,
-    text_array,
-)
+from msgflow.trace.ctf import arrow
 from msgflow.trace.ctf.event_body import Kind
 from msgflow.trace.ctf.event_order import Batch
 from msgflow.trace.ctf.field_columns import FieldRows
@@ -125,15 +119,15 @@ def _gathered(
         if number is None:
             found = map(rows.in_variant, source.paths)
             present = [values for values in found if values is not None]
-            return scattered_array(present, bodies.size, data_type)
+            return arrow.scattered_array(present, bodies.size, data_type)
         field = fields[number]
         if pa.types.is_dictionary(data_type) and field.kind is Kind.TEXT and field.count:
             return _short_names(rows.words(number, f"V{field.count}"))
         if field.kind is Kind.NUMBER:
-            return number_array(rows.numbers(number), data_type)
+            return arrow.number_array(rows.numbers(number), data_type)
         if pa.types.is_list(data_type):
-            return list_array(*rows.elements(number), data_type)
-        texts = text_array(*rows.text(number))
+            return arrow.list_array(*rows.elements(number), data_type)
+        texts = arrow.text_array(*rows.text(number))
         return texts.dictionary_encode() if pa.types.is_dictionary(data_type) else texts
 
     return array
@@ -181,5 +175,5 @@ def _sources(
     }
     return [
         Source(scope, paths, numbers.get(paths[0])) if paths else None
-        for paths in paths_of(columns, declared_schema(structure))
+        for paths in paths_of(columns, arrow.declared_schema(structure))
     ]

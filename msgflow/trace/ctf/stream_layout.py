@@ -65,7 +65,8 @@ class StreamLayout:
         self._short_forms: dict[int, tuple[EventBody, int]] = {}
         if align // BYTE <= _MOST_RESIDUES:
             self.header = compile_header(stream, self.residues)
-        if self.header is not None and self.header.largest_size > GAP:
+        forms = () if self.header is None else self.header.forms
+        if any(max(form.sizes) > GAP for form in forms):
             # Reading it all at once might go beyond the end of the memory.
             self.header = None
         # Event class id to layout.

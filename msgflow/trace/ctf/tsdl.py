@@ -8,14 +8,7 @@ from uuid import UUID
 
 from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.declarations import Clock, EventClass, StreamClass, TraceClass
-from msgflow.trace.ctf.field_types import (
-    MetadataError,
-    Reference,
-    Role,
-    Scope,
-    integer_of,
-    may_have,
-)
+from msgflow.trace.ctf.field_types import MetadataError, Role, Scope, integer_of, may_have
 from msgflow.trace.ctf.tsdl_tokens import Token, tokens_of
 from msgflow.trace.ctf.tsdl_types import TypeParser, Value, without_prefix
 
@@ -265,7 +258,7 @@ class _Resolver:
             choices.append(ctf.Choice(name, self._type(choice.type, frames), ranges))
         return replace(declared, choices=tuple(choices))
 
-    def _find(self, reference: Reference, frames: Frames) -> ctf.Type | None:
+    def _find(self, reference: ctf.Reference, frames: Frames) -> ctf.Type | None:
         if reference.scope is not None:
             return _follow(self._scopes.get(reference.scope), reference.path)
         for frame in reversed(frames):
