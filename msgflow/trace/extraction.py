@@ -19,7 +19,6 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
@@ -115,21 +114,17 @@ def _reason(error: Exception) -> str:
     return str(error).rstrip(".") or "it ends too early"
 
 
-@dataclass
 class Target:
     """A directory that is being filled, never beyond its borders nor those of the disk."""
 
-    archive: Path
-    directory: Path
-    links: list[tuple[str, Path, str]] = field(default_factory=list)
-    room: int = field(init=False)
-    limit: int = field(init=False)
-    size: int = 0
-
-    def __post_init__(self) -> None:
-        free = shutil.disk_usage(self.directory).free
+    def __init__(self, archive: Path, directory: Path) -> None:
+        free = shutil.disk_usage(directory).free
+        self.archive = archive
+        self.directory = directory
+        self.links: list[tuple[str, Path, str]] = []
         self.room = free - free // _FREE_PART_LEFT
-        self.limit = limit_of(self.archive.stat().st_size)
+        self.limit = limit_of(archive.stat().st_size)
+        self.size = 0
 
     def take(self, size: int) -> None:
         """Use up some bytes of the disk."""

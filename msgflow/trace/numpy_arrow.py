@@ -18,14 +18,6 @@ Integers = NDArray[np.int64]
 Truths = NDArray[np.bool_]
 """Arrays: of any values, of integers, of truth values."""
 
-_NUMBERS = {
-    np.dtype(name): getattr(pa, name)()
-    for name in (
-        *("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"),
-        *("float32", "float64"),
-    )
-}
-
 
 def distinct(values: Values) -> Values:
     """Return each value once, in order; where that is all that is wanted, numpy imports `ma`."""
@@ -39,7 +31,8 @@ def to_arrow(values: Values, is_missing: Truths | None = None) -> pa.Array:
     if values.dtype == np.bool_:
         return pa.Array.from_buffers(pa.bool_(), count, [valid, _bits(values)])
     native = np.ascontiguousarray(values, values.dtype.newbyteorder("="))
-    return pa.Array.from_buffers(_NUMBERS[native.dtype], count, [valid, pa.py_buffer(native)])
+    data_type = pa.from_numpy_dtype(native.dtype)
+    return pa.Array.from_buffers(data_type, count, [valid, pa.py_buffer(native)])
 
 
 def integers_to_arrow(values: Sequence[int | None], data_type: pa.DataType) -> pa.Array:

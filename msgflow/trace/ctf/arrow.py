@@ -10,9 +10,6 @@ from msgflow.trace.columns import field_metadata
 from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.numpy_arrow import Integers, Values, to_arrow
 
-_UNSIGNED = {8: pa.uint8(), 16: pa.uint16(), 32: pa.uint32(), 64: pa.uint64()}
-_SIGNED = {8: pa.int8(), 16: pa.int16(), 32: pa.int32(), 64: pa.int64()}
-
 
 def arrow_type(declared: ctf.Type) -> pa.DataType:
     """Return the Arrow type; a variant is a structure of all its options, all but one NULL."""
@@ -22,8 +19,8 @@ def arrow_type(declared: ctf.Type) -> pa.DataType:
                 return pa.bool_()
             if declared.arrow == "bits":
                 return pa.uint64()
-            types = _SIGNED if declared.signed else _UNSIGNED
-            return types[next(size for size in types if size >= declared.size)]
+            size = next(bits for bits in (8, 16, 32, 64) if bits >= declared.size)
+            return pa.type_for_alias(f"int{size}" if declared.signed else f"uint{size}")
         case ctf.VariableInteger():
             return pa.int64() if declared.signed else pa.uint64()
         case ctf.Real():

@@ -150,13 +150,9 @@ def packet_batches(
     """
     rows = [_row(packet, report) for packet in packets]
     for begin in range(0, len(rows), most):
-        columns = [
-            integers_to_arrow(values, field.type)
-            for field, values in zip(
-                PACKET_SCHEMA, zip(*rows[begin : begin + most], strict=True), strict=True
-            )
-        ]
-        batch = pa.RecordBatch.from_arrays(columns, schema=PACKET_SCHEMA)
+        columns = zip(*rows[begin : begin + most], strict=True)
+        arrays = list(map(integers_to_arrow, columns, PACKET_SCHEMA.types))
+        batch = pa.RecordBatch.from_arrays(arrays, schema=PACKET_SCHEMA)
         yield EventBatch(PACKET, batch, number)
 
 

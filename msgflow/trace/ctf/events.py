@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -211,20 +211,17 @@ def _read_headers(
     firsts = (np.cumsum(counts) - counts)[counts > 0]
     header = layout.known_header
     selector = reader.gather(header.selector, slice(None))
-    forms = reader.rows_of_forms(selector)
     classes = np.empty(positions.size, np.uint32)
     values = np.empty(positions.size, np.uint64)
     bodies = np.empty(positions.size, np.int64)
     whole = []
-    for form, rows in zip(header.forms, forms, strict=True):
-        if not isinstance(rows, slice) and rows.size == 0:
-            continue
+    for form, rows in reader.rows_of_forms(selector):
         classes[rows] = reader.classes(form, selector, rows)
         bodies[rows] = positions[rows] + reader.by_residue(form.sizes, rows)
         if form.time is not None:
             values[rows] = reader.gather(form.time, rows)
             if form.time.bits == 64:
-                whole.append(np.arange(positions.size) if isinstance(rows, slice) else rows)
+                whole.append(np.arange(positions.size)[rows])
         else:
             values[rows] = np.repeat(befores, counts)[rows]
     if header.narrow_bits is None:
@@ -257,12 +254,13 @@ class _HeaderColumns:
             values = values & place.mask
         return values
 
-    def rows_of_forms(self, selector: Values) -> list[Any]:
+    def rows_of_forms(self, selector: Values) -> Iterator[tuple[Form, Any]]:
+        """Yield the forms that headers have, and the rows of each."""
         header = self._layout.known_header
         if len(header.forms) == 1:
-            return [slice(None)]
+            yield header.forms[0], slice(None)
+            return
         remaining = np.arange(selector.size)
-        rows = []
         for form in header.forms:
             matches = np.zeros(remaining.size, np.bool_)
             for first, last in form.choice.ranges if form.choice else ():
@@ -272,13 +270,11 @@ class _HeaderColumns:
                 matches |= (selector[remaining] >= low) & (selector[remaining] <= high)
             if remaining.size == selector.size and matches.all():
                 # The usual case: all events of a batch have the short form.
-                return [
-                    slice(None) if other is form else np.empty(0, np.int64)
-                    for other in header.forms
-                ]
-            rows.append(remaining[matches])
+                yield form, slice(None)
+                return
+            if matches.any():
+                yield form, remaining[matches]
             remaining = remaining[~matches]
-        return rows
 
     def classes(self, form: Form, selector: Values, rows: Any) -> Any:
         layout = self._layout

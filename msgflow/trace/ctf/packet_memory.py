@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from msgflow.trace.ctf.packet_order import Entry
 from msgflow.trace.ctf.stream_layout import GAP
@@ -25,8 +24,7 @@ class Memory:
     """Bytes that Python and numpy share."""
 
     def __init__(self, data: bytearray) -> None:
-        self.data = data  # for Python
-        self.bytes: NDArray[np.uint8] = np.frombuffer(self.data, np.uint8)  # for numpy
+        self.data = data
         self._views: dict[str, Values] = {}
 
     def view(self, dtype: str) -> Values:

@@ -127,15 +127,8 @@ class CtfTraceSet(TraceSet):
         packet = entry.packet
         if packet.is_cut and message == BEYOND_END:
             return  # reported when the packet was found
-        self._report(
-            Damage(
-                entry.stream.trace_index,
-                self.unpacked.shown(packet.path),
-                packet.number,
-                packet.offset + offset,
-                message,
-            )
-        )
+        file, at = self.unpacked.shown(packet.path), packet.offset + offset
+        self._report(Damage(entry.stream.trace_index, file, packet.number, at, message))
 
     def _report(self, damage: Damage) -> None:
         if self._strict:

@@ -49,13 +49,10 @@ class StreamLayout:
         self.trace_index = trace_index
         self.trace = trace
         self.stream = stream
-        align = max(
-            largest_align(stream.event_header),
-            largest_align(stream.event_context),
-            *(largest_align(event.specific_context) for event in stream.events.values()),
-            *(largest_align(event.payload) for event in stream.events.values()),
-            BYTE,
-        )
+        structures = [stream.event_header, stream.event_context]
+        for event in stream.events.values():
+            structures += [event.specific_context, event.payload]
+        align = max(BYTE, *map(largest_align, structures))
         # Events whose positions differ by a multiple of this have the same layout.
         self.residues = min(align // BYTE, _MOST_RESIDUES)
         # How to read many event headers at once; None: they are read field by field.

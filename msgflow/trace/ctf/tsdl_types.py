@@ -12,6 +12,7 @@ from msgflow.trace.ctf.tsdl_tokens import Token, TokenStream
 Labels = dict[str, tuple[tuple[int, int], ...]]
 Value = int | str
 
+_DECLARATIONS = {"typealias", "typedef", "struct", "variant", "enum"}
 _BASES = dict.fromkeys(("16", "x", "hex", "hexadecimal", "p"), 16)
 _TEXT_ENCODINGS = {"utf8", "utf-8", "ascii"}
 _ABSOLUTE = (
@@ -45,14 +46,7 @@ class TypeParser(TokenStream):
 
     def at_declaration(self) -> bool:
         """Tell whether a `typealias`, `typedef` or named compound type follows."""
-        token = self.token
-        return token.kind == "name" and token.value in {
-            "typealias",
-            "typedef",
-            "struct",
-            "variant",
-            "enum",
-        }
+        return self.token.kind == "name" and self.token.value in _DECLARATIONS
 
     def declaration(self) -> None:
         """Parse a declaration that gives a type a name."""
