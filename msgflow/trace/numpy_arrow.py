@@ -6,6 +6,7 @@ something of it: that takes longer than reading a small trace. Nor is `numpy.ma`
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,6 +18,8 @@ Values = NDArray[Any]
 Integers = NDArray[np.int64]
 Truths = NDArray[np.bool_]
 """Arrays: of any values, of integers, of truth values."""
+
+_type_of = functools.cache(pa.from_numpy_dtype)
 
 
 def distinct(values: Values) -> Values:
@@ -31,8 +34,7 @@ def to_arrow(values: Values, is_missing: Truths | None = None) -> pa.Array:
     if values.dtype == np.bool_:
         return pa.Array.from_buffers(pa.bool_(), count, [valid, _bits(values)])
     native = np.ascontiguousarray(values, values.dtype.newbyteorder("="))
-    data_type = pa.from_numpy_dtype(native.dtype)
-    return pa.Array.from_buffers(data_type, count, [valid, pa.py_buffer(native)])
+    return pa.Array.from_buffers(_type_of(native.dtype), count, [valid, pa.py_buffer(native)])
 
 
 def integers_to_arrow(values: Sequence[int | None], data_type: pa.DataType) -> pa.Array:
