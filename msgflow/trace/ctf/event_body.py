@@ -15,7 +15,7 @@ from typing import Literal
 
 from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.declarations import EventClass, StreamClass
-from msgflow.trace.ctf.field_types import BYTE, FieldError, Reference, Scope, aligned
+from msgflow.trace.ctf.field_types import BYTE, FieldError, Reference, Scope
 from msgflow.trace.ctf.layout import DynamicError, Leaf, dtype_of, is_dense, lay_out
 
 _WIDTHS = {8, 16, 32, 64}
@@ -77,7 +77,8 @@ class EventBody:
         return {each.path: place for place, each in enumerate(self.fields or ()) if each.path}
 
     @cached_property
-    def _orders(self) -> tuple[Literal["big", "little"], ...]:
+    def orders(self) -> tuple[Literal["big", "little"], ...]:
+        """Order of the bytes of each field."""
         return tuple("big" if field.dtype[0] == ">" else "little" for field in self.fields or ())
 
     @cached_property
@@ -116,15 +117,14 @@ class EventBody:
                     raise FieldError("a text does not end within the packet")
             elif kind is Kind.NUMBER:
                 content = data[position : position + size]
-                lengths[number] = int.from_bytes(content, self._orders[number])
+                lengths[number] = int.from_bytes(content, self.orders[number])
                 position += size
             else:
                 position += lengths[number] * size
             if position > limit:
                 raise FieldError("a field goes beyond the end of the packet")
         if self.variant is not None:
-            option = self.variant.option(lengths[self.variant.selector])
-            return option.body.end(data, aligned(position, option.align), limit)
+            return self.variant.end(data, position, lengths[self.variant.selector], limit)
         return position
 
 
@@ -134,6 +134,9 @@ class Option:
 
     choice: ctf.Choice  # as declared
     align: int  # in bytes
+    size: int  # of its fields, in bytes
+    # Of what chooses the option of its own variant, if any: where it is, its bytes and their order.
+    selector: tuple[int, int, Literal["big", "little"]]
     body: EventBody  # its fields, at fixed places, and the variant that it may end in
 
 
@@ -157,6 +160,20 @@ class VariantBody:
                 raise FieldError(f"a variant has no option for the value {value}")
             self._chosen[value] = found
         return self._chosen[value]
+
+    def end(self, data: bytearray, position: int, value: int, limit: int) -> int:
+        """Return the byte at which the variant that is due at `position` ends."""
+        option = self.option(value)
+        while True:
+            begin = (position + option.align - 1) & -option.align
+            position = begin + option.size
+            if position > limit:
+                raise FieldError("a field goes beyond the end of the packet")
+            if option.body.variant is None:
+                return position
+            offset, width, order = option.selector
+            content = data[begin + offset : begin + offset + width]
+            option = option.body.variant.option(int.from_bytes(content, order))
 
     def has(self, path: tuple[str, ...]) -> bool:
         """Tell whether there is a field at this path: variant, option, and names of members."""
@@ -227,13 +244,16 @@ def _option(choice: ctf.Choice) -> Option:
         begin = leaf.position // BYTE
         fields += [_filler(begin - at), replace(known, align=1)]
         at = begin + known.width * known.count
-    fields.append(_filler((end + BYTE - 1) // BYTE - at))
+    size = (end + BYTE - 1) // BYTE
+    fields.append(_filler(size - at))
     variant = _variant(fields, None, last)
     if variant is not None and end % BYTE:
         raise DynamicError
     offsets = tuple((offset,) for offset in _offsets(fields, 0))
     body = EventBody(tuple(fields), None, offsets, variant)
-    return Option(choice, max(fixed.align // BYTE, 1), body)
+    place = 0 if variant is None else variant.selector
+    selector = offsets[place][0], fields[place].width, body.orders[place]
+    return Option(choice, max(fixed.align // BYTE, 1), size, selector, body)
 
 
 def _filler(size: int) -> PlainField:
