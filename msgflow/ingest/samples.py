@@ -11,7 +11,6 @@ import pyarrow as pa
 
 from msgflow.db.transaction import transaction
 from msgflow.errors import TraceError
-from msgflow.trace import archive
 from msgflow.trace.perf_script import DATA, TEXT, read_script, sample_files, write_script
 
 if TYPE_CHECKING:
@@ -35,8 +34,8 @@ def load_samples(
     Those of archives are where the traces have them unpacked. The text of perf goes to `workspace`.
     """
     warnings = []
-    for file in sample_files([*paths, *traces.unpacked]):
-        shown = archive.shown(file, traces.unpacked) or Path(os.path.realpath(file))
+    for file in sample_files([*paths, *traces.unpacked.archives]):
+        shown = Path(os.path.realpath(traces.unpacked.shown(file)))
         hostname = _given_name(shown, traces, hostnames)
         text = file
         try:

@@ -1,12 +1,21 @@
-"""Archives of traces, recognised by the names of their files."""
+"""Archives of traces, recognised by their names, unpacked to a directory while they are read."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+import os
+import shutil
+import tempfile
+import weakref
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+
+from msgflow.errors import TraceError
 
 SUFFIXES = (".tar", ".tar.gz", ".tgz", ".tar.zst", ".tzst", ".tar.xz", ".txz", ".zip")
 """How the names of archives end that can be read."""
+
+_PREFIX = "msgflow-"
 
 
 def is_archive(path: Path) -> bool:
@@ -22,9 +31,66 @@ def stem(path: Path) -> str:
     return path.name[: -len(suffix)]
 
 
-def shown(path: Path, unpacked: Mapping[Path, Path]) -> Path | None:
-    """Return a path as it is in its archive, given where archives were unpacked; None: in none."""
-    for directory, archive in unpacked.items():
-        if path.is_relative_to(directory):
-            return archive / path.relative_to(directory)
-    return None
+class Unpacked:
+    """Paths to read, with directories in place of archives, in the temporary directory (TMPDIR).
+
+    The directories are removed by `remove`, or when this object is dropped.
+    """
+
+    def __init__(self, paths: Sequence[str | Path]) -> None:
+        """Unpack all archives among `paths`."""
+        self.archives: dict[Path, Path] = {}  # each of the directories, and its archive
+        self.remove = weakref.finalize(self, _remove, self.archives)
+        try:
+            self.paths = [self._unpacked(Path(path)) for path in paths]
+        except BaseException:
+            self.remove()
+            raise
+
+    def shown(self, path: Path) -> Path:
+        """Return a path as the user knows it: within an archive, that of the archive first."""
+        for directory, archive in self.archives.items():
+            if path.is_relative_to(directory):
+                return archive / path.relative_to(directory)
+        return path
+
+    @contextlib.contextmanager
+    def explained(self) -> Iterator[None]:
+        """Let errors name what the user knows."""
+        try:
+            yield
+        except TraceError as error:
+            error.message = self._translated(error.message)
+            error.hint = error.hint and self._translated(error.hint)
+            raise
+
+    def _unpacked(self, path: Path) -> Path:
+        if not is_archive(path):
+            return path
+        archive = Path(os.path.realpath(path))
+        for directory, known in self.archives.items():
+            if known == archive:
+                return directory
+        try:
+            directory = Path(tempfile.mkdtemp(prefix=_PREFIX)).resolve()
+        except OSError as error:
+            raise TraceError(
+                f"no temporary directory to unpack the archive to — {error}",
+                hint="TMPDIR=DIRECTORY msgflow … unpacks it elsewhere",
+            ) from error
+        self.archives[directory] = archive
+        # Its libraries are loaded only where there is an archive.
+        from msgflow.trace.extraction import unpack
+
+        unpack(archive, directory)
+        return directory
+
+    def _translated(self, text: str) -> str:
+        for directory, archive in self.archives.items():
+            text = text.replace(str(directory), str(archive))
+        return text
+
+
+def _remove(directories: Iterable[Path]) -> None:
+    for directory in directories:
+        shutil.rmtree(directory, ignore_errors=True)

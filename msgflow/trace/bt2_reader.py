@@ -9,26 +9,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pyarrow as pa
 
 from msgflow.errors import TraceError
 from msgflow.trace import bt2_library, columns
+from msgflow.trace.archive import Unpacked
 from msgflow.trace.bt2_fields import schema_of, value_of
 from msgflow.trace.columns import COMMON_SCHEMA, PACKET_SCHEMA
-from msgflow.trace.ctf.clock import GIGA, Clock
-from msgflow.trace.ctf.packet_index import DiscardCounters
+from msgflow.trace.ctf.declarations import GIGA, Clock
+from msgflow.trace.ctf.packet_index import first_counter
 from msgflow.trace.ctf.trace_info import description
-from msgflow.trace.metadata_frame import MetadataKind, kind_of
-from msgflow.trace.model import PACKET, EventBatch, Progress, TraceInfo
+from msgflow.trace.metadata_frame import MetadataKind, text_of
+from msgflow.trace.model import PACKET, EventBatch, Progress, TraceInfo, TraceLocation
 from msgflow.trace.time_base import on_one_base
-from msgflow.trace.trace_set import Report, TraceSet
-
-if TYPE_CHECKING:
-    from msgflow.trace.archived_traces import Unpacked
-    from msgflow.trace.model import TraceLocation
-    from msgflow.trace.trace_set import Batches, Wanted
+from msgflow.trace.trace_set import Batches, Report, TraceSet, Wanted
 
 # Babeltrace orders by times that it rounds, where a clock does not count nanoseconds.
 _ROUNDING_NS = 1000
@@ -40,15 +36,13 @@ _ADDRESS = re.compile(r"[\w-]*addr=0x[0-9a-f]+,?")
 class Bt2TraceSet(TraceSet):
     """Traces read through Babeltrace 2."""
 
-    def __init__(
-        self, locations: Sequence[TraceLocation], archives: Unpacked | None = None
-    ) -> None:
+    def __init__(self, locations: Sequence[TraceLocation], unpacked: Unpacked) -> None:
         """Describe the traces; raises TraceError where bt2 is missing or cannot open one."""
-        super().__init__(archives)
+        super().__init__(unpacked)
         self._bt2 = bt2_library.load()
         described = [describe(self._bt2, at.path, index) for index, at in enumerate(locations)]
         self._located = on_one_base([info for info, _ in described], {})
-        self.traces = tuple(replace(info, path=self.shown(info.path)) for info in self._located)
+        self.traces = tuple(replace(info, path=unpacked.shown(info.path)) for info in self._located)
         self._declared = columns.merged_schemas(e for _, events in described for e in events)
 
     def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
@@ -89,7 +83,8 @@ class _Reading:
     def __post_init__(self) -> None:
         self._streams: dict[int, _Stream] = {}
         self._first_traces: dict[Any, int] = {}
-        self._counters = DiscardCounters()
+        # Of lost events, by recording: they go on in its next directory.
+        self._counters: Counter[tuple[Any, ...]] = Counter()
         self._simultaneous: list[Any] = []
         self._paths: dict[int, tuple[Any, Any]] = {}
         self._rows: dict[str, list[list[Any]]] = {}
@@ -169,10 +164,7 @@ class _Reading:
             self.duplicates += 1
             return None
         stream.packet_count += 1
-        discarded: int | None = 0
-        if stream.discards is not None:
-            path, count = self.traces[trace].path, stream.discards.count
-            discarded = self._counters.rise(stream.recording, path, count)
+        discarded = 0 if stream.discards is None else self._discarded(stream)
         if stream.lost_packets != 0 and discarded != 0:
             discarded = None  # nothing tells which of them were in the lost packets
         return {
@@ -189,6 +181,21 @@ class _Reading:
             "lost_packet_count": stream.lost_packets,
             "is_numbered": False,
         }
+
+    def _discarded(self, stream: _Stream) -> int | None:
+        """Return how many events were lost before a packet; None where nothing tells it."""
+        before = self._counters[stream.recording]
+        lost: int | None = stream.discards.count
+        # Of the first packet of a directory, Babeltrace does not tell it.
+        if lost is None:
+            trace, class_id, instance_id = stream.key
+            counter = first_counter(self.traces[trace].path, class_id, instance_id)
+            if counter is None:
+                return None
+            lost = counter - before if counter >= before else counter
+            before = counter - lost
+        self._counters[stream.recording] = before + lost
+        return lost
 
     def _number(self) -> None:
         """Number the events of one time in order of trace and stream, and keep what is wanted."""
@@ -274,7 +281,7 @@ def parameters_of(path: Path, place: int = 0, correction_ns: int = 0) -> dict[st
 
 def describe(bt2: Any, path: Path, index: int) -> tuple[TraceInfo, list[Any]]:
     """Describe one trace, with names and payload schemas of its events."""
-    if kind_of(path) is MetadataKind.JSON and bt2.__version__ < "2.1":
+    if text_of(path)[0] is MetadataKind.JSON and bt2.__version__ < "2.1":
         raise TraceError(
             "the trace is CTF 2, which needs babeltrace2 2.1 or newer, here is "
             f"{bt2.__version__} — {path}",
@@ -300,7 +307,7 @@ def describe(bt2: Any, path: Path, index: int) -> tuple[TraceInfo, list[Any]]:
         path,
         index,
         uuid=None if trace.uuid is None else str(trace.uuid),
-        environment={str(name): str(value) for name, value in trace.environment.items()},
+        environment=dict(trace.environment),
         clock=clock_of(streams[0].default_clock_class),
         begins=[int(span["begin"]) for span in ranges],
         ends=[int(span["end"]) for span in ranges],

@@ -100,15 +100,6 @@ def _can_hold(wanted: pa.DataType, declared: pa.DataType | None) -> bool:
     return bool(wanted.equals(declared))
 
 
-def _union_type(first: pa.DataType, second: pa.DataType) -> pa.DataType | None:
-    """Return the type that holds values of both, None if no type does."""
-    if first.equals(second):
-        return first
-    if pa.types.is_integer(first) and pa.types.is_integer(second):
-        return pa.int64()
-    return None
-
-
 def complete_schemas(
     wanted: Mapping[str, pa.Schema | None] | None, declared: Mapping[str, pa.Schema]
 ) -> Mapping[str, pa.Schema]:
@@ -132,7 +123,9 @@ def merged_schemas(declared: Iterable[tuple[str, pa.Schema]]) -> dict[str, pa.Sc
         merged = events.setdefault(event, {})
         for field in schema:
             known = merged.setdefault(field.name, field)
-            joint = _union_type(known.type, field.type) or known.type
+            are_integers = pa.types.is_integer(known.type) and pa.types.is_integer(field.type)
+            is_other = are_integers and known.type != field.type
+            joint = pa.int64() if is_other else known.type
             merged[field.name] = pa.field(field.name, joint, metadata=_joined(known, field))
     return {event: pa.schema(list(merged.values())) for event, merged in events.items()}
 

@@ -103,10 +103,7 @@ def irregular_files(directory: Path) -> list[tuple[Path, str]]:
 def _check_exists(path: Path) -> None:
     kind = irregular(path)
     if kind is not None:
-        raise TraceError(
-            f"not a trace but {kind} — {path}",
-            hint=metadata_frame.DIRECTORY_HINT,
-        )
+        raise TraceError(f"not a trace but {kind} — {path}", hint=metadata_frame.DIRECTORY_HINT)
     if not path.exists():
         raise TraceError(
             f"no such file or directory — {path}",
@@ -159,7 +156,7 @@ def _first_stream(directory: Path, names: Sequence[str]) -> list[Path]:
 
 def _locate(directory: Path) -> TraceLocation:
     try:
-        metadata_frame.kind_of(directory)
+        metadata_frame.text_of(directory)
         files = stream_files(directory)
         size = sum(file.stat().st_size for file in files)
     except OSError as error:

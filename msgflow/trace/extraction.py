@@ -19,7 +19,6 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
@@ -41,6 +40,7 @@ _UNITS = {"": 1, "K": 10**3, "M": 10**6, "G": 10**9, "T": 10**12}
 _SIZE = re.compile(r"(\d{1,15})\s*([KMGT]?)B?", re.IGNORECASE | re.ASCII)
 # What a file takes on the disk at least, however small it is.
 _BYTES_PER_MEMBER = 4096
+_SPECIAL = "is a device or another special file"
 _ZIP = b"PK"
 _REGULAR_END: type[Exception] = tarfile.EOFHeaderError  # type: ignore[attr-defined]
 _LONG_HEADERS = {
@@ -114,21 +114,17 @@ def _reason(error: Exception) -> str:
     return str(error).rstrip(".") or "it ends too early"
 
 
-@dataclass
 class Target:
     """A directory that is being filled, never beyond its borders nor those of the disk."""
 
-    archive: Path
-    directory: Path
-    links: list[tuple[str, Path, str]] = field(default_factory=list)
-    room: int = field(init=False)
-    limit: int = field(init=False)
-    size: int = 0
-
-    def __post_init__(self) -> None:
-        free = shutil.disk_usage(self.directory).free
+    def __init__(self, archive: Path, directory: Path) -> None:
+        free = shutil.disk_usage(directory).free
+        self.archive = archive
+        self.directory = directory
+        self.links: list[tuple[str, Path, str]] = []
         self.room = free - free // _FREE_PART_LEFT
-        self.limit = limit_of(self.archive.stat().st_size)
+        self.limit = limit_of(archive.stat().st_size)
+        self.size = 0
 
     def take(self, size: int) -> None:
         """Use up some bytes of the disk."""
@@ -158,7 +154,7 @@ class Target:
         self.take(_BYTES_PER_MEMBER)
         path = PurePosixPath(member)
         if path.is_absolute() or ".." in path.parts:
-            raise self._refusal(member, "would lie outside of it")
+            raise self.refusal(member, "would lie outside of it")
         return self.directory.joinpath(*path.parts)
 
     def make_directory(self, member: str) -> None:
@@ -191,10 +187,6 @@ class Target:
         """Remember a link."""
         self.links.append((member, self.place(member), to))
 
-    def refuse_special(self, member: str) -> TraceError:
-        """Return the error about a device, pipe or the like."""
-        return self._refusal(member, "is a device or another special file")
-
     def make_links(self) -> None:
         """Make the symbolic links; where they lead is only certain when all are made."""
         for member, place, _ in self.links:
@@ -205,8 +197,7 @@ class Target:
             with _of_one_kind(member):
                 place.unlink(missing_ok=True)
                 place.symlink_to(to)
-        dangling = {place for member, place, _ in self.links if not self._leads_inside(member)}
-        for place in dangling:
+        for place in {place for member, place, _ in self.links if not self._leads_inside(member)}:
             place.unlink()
 
     def _leads_inside(self, member: str) -> bool:
@@ -217,10 +208,11 @@ class Target:
         except OSError:  # leads nowhere, or in a circle
             end, is_there = os.path.realpath(place), False
         if not Path(end).is_relative_to(self.directory.resolve()):
-            raise self._refusal(member, "is a link that leads outside of it")
+            raise self.refusal(member, "is a link that leads outside of it")
         return is_there
 
-    def _refusal(self, member: str, why: str) -> TraceError:
+    def refusal(self, member: str, why: str) -> TraceError:
+        """Return the error about a member that no trace has."""
         return TraceError(
             f"a member of the archive {why}: {member!r} — {self.archive}",
             hint="ask who made it; msgflow reads no such archive",
@@ -275,7 +267,7 @@ def _unpack_tar(file: IO[bytes], target: Target) -> None:
             elif member.issym():
                 target.add_symbolic_link(member.name, member.linkname)
             else:
-                raise target.refuse_special(member.name)
+                raise target.refusal(member.name, _SPECIAL)
         # Checksums stand at the end of the compressed stream, behind the end of the tar.
         while rest := content.read(_CHUNK):
             target.take(len(rest))
@@ -296,7 +288,7 @@ def _unpack_zip(file: IO[bytes], target: Target) -> None:
                 with archive.open(member) as content:
                     target.write(member.filename, content)
             else:
-                raise target.refuse_special(member.filename)
+                raise target.refusal(member.filename, _SPECIAL)
 
 
 def _open_plain(file: IO[bytes]) -> Any:

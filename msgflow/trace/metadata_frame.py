@@ -41,11 +41,6 @@ def content_of(directory: Path) -> bytes:
     return read_regular(directory / FILE_NAME, _MOST_BYTES)
 
 
-def kind_of(directory: Path) -> MetadataKind:
-    """Tell the kind of metadata of the trace in this directory."""
-    return text_of(directory)[0]
-
-
 def text_of(directory: Path) -> tuple[MetadataKind, bytes]:
     """Return the kind and the text of the metadata of the trace in this directory."""
     content = content_of(directory)

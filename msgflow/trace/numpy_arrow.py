@@ -6,37 +6,35 @@ something of it: that takes longer than reading a small trace. Nor is `numpy.ma`
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+Values = NDArray[Any]
+Integers = NDArray[np.int64]
+Truths = NDArray[np.bool_]
+"""Arrays: of any values, of integers, of truth values."""
 
-_NUMBERS = {
-    np.dtype(name): getattr(pa, name)()
-    for name in (
-        *("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"),
-        *("float32", "float64"),
-    )
-}
+_type_of = functools.cache(pa.from_numpy_dtype)
 
 
-def distinct(values: NDArray[Any]) -> NDArray[Any]:
+def distinct(values: Values) -> Values:
     """Return each value once, in order; where that is all that is wanted, numpy imports `ma`."""
     return np.unique(values, return_index=True)[0]
 
 
-def to_arrow(values: NDArray[Any], is_missing: NDArray[np.bool_] | None = None) -> pa.Array:
+def to_arrow(values: Values, is_missing: Truths | None = None) -> pa.Array:
     """Return numbers or truth values; those that are missing are NULL."""
     count = values.size
     valid = None if is_missing is None or not is_missing.any() else _bits(~is_missing)
     if values.dtype == np.bool_:
         return pa.Array.from_buffers(pa.bool_(), count, [valid, _bits(values)])
     native = np.ascontiguousarray(values, values.dtype.newbyteorder("="))
-    return pa.Array.from_buffers(_NUMBERS[native.dtype], count, [valid, pa.py_buffer(native)])
+    return pa.Array.from_buffers(_type_of(native.dtype), count, [valid, pa.py_buffer(native)])
 
 
 def integers_to_arrow(values: Sequence[int | None], data_type: pa.DataType) -> pa.Array:
@@ -67,7 +65,7 @@ def empty_batch(schema: pa.Schema) -> pa.RecordBatch:
     return pa.RecordBatch.from_arrays(nothing, schema=schema)
 
 
-def to_numpy(array: pa.Array) -> NDArray[Any]:
+def to_numpy(array: pa.Array) -> Values:
     """Return numbers or truth values; what is in the place of NULL means nothing."""
     _, content = array.buffers()
     begin, end = array.offset, array.offset + len(array)
@@ -75,7 +73,7 @@ def to_numpy(array: pa.Array) -> NDArray[Any]:
         return np.zeros(len(array), array.type.to_pandas_dtype())
     if pa.types.is_boolean(array.type):
         return _truths(content, begin, end)
-    values: NDArray[Any] = np.frombuffer(content, array.type.to_pandas_dtype())[begin:end]
+    values: Values = np.frombuffer(content, array.type.to_pandas_dtype())[begin:end]
     return values
 
 
@@ -88,7 +86,7 @@ def text_lengths(array: pa.Array) -> NDArray[np.int32]:
     return np.diff(np.frombuffer(offsets, np.int32)[begin : end + 1])
 
 
-def without(array: pa.Array, is_left_out: NDArray[np.bool_]) -> pa.Array:
+def without(array: pa.Array, is_left_out: Truths) -> pa.Array:
     """Return numbers or texts with NULL in place of those that are left out."""
     # Validity is counted from the beginning of the buffers.
     before = np.zeros(array.offset, np.bool_)
@@ -98,7 +96,7 @@ def without(array: pa.Array, is_left_out: NDArray[np.bool_]) -> pa.Array:
     )
 
 
-def is_valid(array: pa.Array) -> NDArray[np.bool_]:
+def is_valid(array: pa.Array) -> Truths:
     """Return which values are not NULL."""
     valid = array.buffers()[0]
     if valid is None:
@@ -106,11 +104,11 @@ def is_valid(array: pa.Array) -> NDArray[np.bool_]:
     return _truths(valid, array.offset, array.offset + len(array))
 
 
-def _bits(truths: NDArray[np.bool_]) -> pa.Buffer:
+def _bits(truths: Truths) -> pa.Buffer:
     return pa.py_buffer(np.packbits(truths, bitorder="little"))
 
 
-def _truths(bits: pa.Buffer, begin: int, end: int) -> NDArray[np.bool_]:
+def _truths(bits: pa.Buffer, begin: int, end: int) -> Truths:
     return np.unpackbits(np.frombuffer(bits, np.uint8), count=end, bitorder="little")[begin:].view(
         np.bool_
     )

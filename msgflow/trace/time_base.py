@@ -13,10 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from msgflow.trace.model import TraceInfo
+from msgflow.trace.model import TraceInfo
 
 # Uuid and name of a clock.
 ClockName = tuple[str, str | None]

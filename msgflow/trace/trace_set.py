@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-import contextlib
 import weakref
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterator, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgflow.errors import UsageError
-from msgflow.trace import archive
-from msgflow.trace.model import Progress
+from msgflow.trace.archive import Unpacked
+from msgflow.trace.model import Damage, EventBatch, Progress, TraceInfo
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
-    from msgflow.trace.archived_traces import Unpacked
-    from msgflow.trace.model import Damage, EventBatch, TraceInfo
-
-    Wanted = Mapping[str, pa.Schema | None] | None
-    Batches = Generator[EventBatch, None, None]
-
 DEFAULT_BATCH_ROWS = 65_536
 
+Wanted = Mapping[str, "pa.Schema | None"] | None
+Batches = Generator[EventBatch, None, None]
 Report = Callable[[Progress], None]
 """What a reader calls now and then to say how far it has come."""
 
@@ -36,8 +30,8 @@ class TraceSet(ABC):
 
     traces: tuple[TraceInfo, ...]  # what each trace declares, in order of path
 
-    def __init__(self, archives: Unpacked | None = None) -> None:
-        """Take over the unpacked archives with the traces, if any."""
+    def __init__(self, unpacked: Unpacked) -> None:
+        """Take over the archives that were unpacked for the traces."""
         # (trace index, event name) to the number of events read, wanted or not; only events that
         # occur. Complete after `batches` has ended.
         self.event_counts: Mapping[tuple[int, str], int] = {}
@@ -49,9 +43,7 @@ class TraceSet(ABC):
         # What is damaged and was left out or read as far as possible. Complete after `batches` has
         # ended.
         self.damages: list[Damage] = []
-        # Directories with what archives had, until the set is closed, and the archive of each.
-        self.unpacked: Mapping[Path, Path] = {} if archives is None else archives.archives
-        self._archives = archives
+        self.unpacked = unpacked  # until the set is closed
         # Weak, so that an iteration which its consumer has dropped is over.
         self._running: weakref.ref[Batches] | None = None
         self._closed = False
@@ -96,8 +88,7 @@ class TraceSet(ABC):
         if iteration is not None:
             iteration.close()
         self._running = None
-        if self._archives is not None:
-            self._archives.remove()
+        self.unpacked.remove()
 
     def __enter__(self) -> TraceSet:
         return self
@@ -105,17 +96,10 @@ class TraceSet(ABC):
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def shown(self, path: Path) -> Path:
-        """Return a path as the user knows it: within an archive, that of the archive first."""
-        return archive.shown(path, self.unpacked) or path
-
     def _explained(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
         """Read everything; errors name what the user knows."""
-        explained = (
-            contextlib.nullcontext() if self._archives is None else self._archives.explained()
-        )
         try:
-            with explained:
+            with self.unpacked.explained():
                 yield from self._batches(wanted, progress, batch_rows)
         finally:
             self._running = None

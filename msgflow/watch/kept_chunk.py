@@ -18,6 +18,7 @@ from msgflow import trace as trace_package
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.load import wanted_events
 from msgflow.trace import PACKET, EventBatch, TraceSet
+from msgflow.trace.archive import Unpacked
 from msgflow.trace.numpy_arrow import to_arrow, to_numpy
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ class KeptTraces(TraceSet):
 
     def __init__(self, lasting: Sequence[KeptChunk], chunks: Sequence[KeptChunk]) -> None:
         """Join them."""
-        super().__init__()
+        super().__init__(Unpacked([]))
         self._parts = (*lasting, *chunks)
         traces: list[TraceInfo] = []
         # Of each part: its trace index -> that in the set.

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 from uuid import UUID
 
-from msgflow.trace.ctf import metadata
 from msgflow.trace.ctf.declarations import TraceClass
 from msgflow.trace.ctf.field_types import (
     Array,
@@ -21,6 +20,7 @@ from msgflow.trace.ctf.field_types import (
     Type,
     Variant,
 )
+from msgflow.trace.ctf.reader import read_metadata
 
 _ORIGINS = {
     Scope.PACKET_HEADER: "packet-header",
@@ -34,7 +34,7 @@ _ORIGINS = {
 
 def translate(directory: Path) -> None:
     """Replace the metadata of the trace in this directory."""
-    fragments = _fragments(metadata.read(directory))
+    fragments = _fragments(read_metadata(directory))
     text = "".join("\x1e" + json.dumps(fragment, indent=2) + "\n" for fragment in fragments)
     (directory / "metadata").write_text(text, encoding="utf-8")
 

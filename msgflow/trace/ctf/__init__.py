@@ -1,7 +1,7 @@
 """Decoder of CTF 1.8 and CTF 2, on numpy and pyarrow alone.
 
-1. Metadata in TSDL or JSON becomes declarations made of field types (`metadata`, `declarations`,
-   `field_types`).
+1. Metadata in TSDL or JSON becomes declarations made of field types (`tsdl`, `json_metadata`,
+   `declarations`, `field_types`).
 2. Stream files become a table of packets in order of time (`packets`, `packet_order`).
 3. Packets are loaded in batches, and their events are found and put in order of time
    (`packet_memory`, `events`, `event_order`). Finding is the only step that goes from event to

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
 from msgflow.trace.columns import field_metadata
 from msgflow.trace.ctf import field_types as ctf
-from msgflow.trace.numpy_arrow import to_arrow
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-_UNSIGNED = {8: pa.uint8(), 16: pa.uint16(), 32: pa.uint32(), 64: pa.uint64()}
-_SIGNED = {8: pa.int8(), 16: pa.int16(), 32: pa.int32(), 64: pa.int64()}
+from msgflow.trace.numpy_arrow import Integers, Values, to_arrow
 
 
 def arrow_type(declared: ctf.Type) -> pa.DataType:
@@ -26,8 +19,8 @@ def arrow_type(declared: ctf.Type) -> pa.DataType:
                 return pa.bool_()
             if declared.arrow == "bits":
                 return pa.uint64()
-            types = _SIGNED if declared.signed else _UNSIGNED
-            return types[next(size for size in types if size >= declared.size)]
+            size = next(bits for bits in (8, 16, 32, 64) if bits >= declared.size)
+            return pa.type_for_alias(f"int{size}" if declared.signed else f"uint{size}")
         case ctf.VariableInteger():
             return pa.int64() if declared.signed else pa.uint64()
         case ctf.Real():
@@ -64,14 +57,12 @@ def _base(declared: ctf.Type) -> int | None:
     return declared.base if isinstance(declared, ctf.Integer) else None
 
 
-def number_array(values: NDArray[Any], data_type: pa.DataType) -> pa.Array:
+def number_array(values: Values, data_type: pa.DataType) -> pa.Array:
     """Return numbers; integers that do not fit wrap round, as in C."""
     return to_arrow(_converted(values, data_type))
 
 
-def list_array(
-    offsets: NDArray[np.int64], elements: NDArray[Any], data_type: pa.DataType
-) -> pa.Array:
+def list_array(offsets: Integers, elements: Values, data_type: pa.DataType) -> pa.Array:
     """Return lists of numbers."""
     return pa.ListArray.from_arrays(
         to_arrow(offsets.astype(np.int32)),
@@ -81,7 +72,7 @@ def list_array(
 
 
 def scattered_array(
-    found: list[tuple[NDArray[np.int64], NDArray[Any]]], count: int, data_type: pa.DataType
+    found: list[tuple[Integers, Values]], count: int, data_type: pa.DataType
 ) -> pa.Array:
     """Return a column in which only some rows have a value.
 
@@ -113,7 +104,7 @@ def scattered_array(
     )
 
 
-def text_array(offsets: NDArray[np.int64], content: NDArray[np.uint8]) -> pa.Array:
+def text_array(offsets: Integers, content: NDArray[np.uint8]) -> pa.Array:
     """Return texts; what is not UTF-8 gets replacement characters."""
     array = pa.StringArray.from_buffers(
         offsets.size - 1,
@@ -131,8 +122,8 @@ def text_array(offsets: NDArray[np.int64], content: NDArray[np.uint8]) -> pa.Arr
     return array
 
 
-def _converted(values: NDArray[Any], data_type: pa.DataType) -> NDArray[Any]:
+def _converted(values: Values, data_type: pa.DataType) -> Values:
     if pa.types.is_boolean(data_type):
-        is_true: NDArray[Any] = values != 0
+        is_true: Values = values != 0
         return is_true
     return np.ascontiguousarray(values, dtype=data_type.to_pandas_dtype())

@@ -5,26 +5,23 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
 from msgflow.trace.columns import PACKET_SCHEMA, complete_schemas, merged_schemas
 from msgflow.trace.ctf.arrow import declared_schema
-from msgflow.trace.ctf.event_order import ordered_batches
+from msgflow.trace.ctf.event_order import Batch, ordered_batches
 from msgflow.trace.ctf.events import event_reader_of
+from msgflow.trace.ctf.field_reader import EventReader
 from msgflow.trace.ctf.field_types import BYTE
+from msgflow.trace.ctf.packet_order import Entry, OnDamage, PacketEvents
 from msgflow.trace.ctf.record_batch import ClassPlan, build_batch, make_plan
+from msgflow.trace.ctf.stream_layout import StreamLayout
 from msgflow.trace.model import PACKET, EventBatch, Progress
 from msgflow.trace.numpy_arrow import integers_to_arrow
 from msgflow.trace.prefetch import prefetched
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.event_order import Batch
-    from msgflow.trace.ctf.field_reader import EventReader
-    from msgflow.trace.ctf.packet_order import Entry, PacketEvents
-    from msgflow.trace.ctf.stream_layout import StreamLayout
 
 LARGEST_BATCH = 8 << 20
 SMALLEST_BATCH = 64 << 10
@@ -42,7 +39,7 @@ class Iteration:
         wanted: Mapping[str, pa.Schema | None] | None,
         progress: Callable[[Progress], None] | None,
         batch_rows: int,
-        report: Callable[[Entry, int, str], None],
+        report: OnDamage,
     ) -> None:
         """Prepare to read `entries`; see `TraceSet.batches` for the rest."""
         self._entries = entries
@@ -145,10 +142,7 @@ def _in_order(parts: list[pa.RecordBatch]) -> pa.RecordBatch:
 
 
 def packet_batches(
-    packets: Sequence[PacketEvents],
-    most: int,
-    number: int,
-    report: Callable[[Entry, int, str], None],
+    packets: Sequence[PacketEvents], most: int, number: int, report: OnDamage
 ) -> Iterator[EventBatch]:
     """Yield the rows of packets that were read in a round, at most `most` in a batch.
 
@@ -156,17 +150,13 @@ def packet_batches(
     """
     rows = [_row(packet, report) for packet in packets]
     for begin in range(0, len(rows), most):
-        columns = [
-            integers_to_arrow(values, field.type)
-            for field, values in zip(
-                PACKET_SCHEMA, zip(*rows[begin : begin + most], strict=True), strict=True
-            )
-        ]
-        batch = pa.RecordBatch.from_arrays(columns, schema=PACKET_SCHEMA)
+        columns = zip(*rows[begin : begin + most], strict=True)
+        arrays = list(map(integers_to_arrow, columns, PACKET_SCHEMA.types))
+        batch = pa.RecordBatch.from_arrays(arrays, schema=PACKET_SCHEMA)
         yield EventBatch(PACKET, batch, number)
 
 
-def _row(packet: PacketEvents, report: Callable[[Entry, int, str], None]) -> tuple[Any, ...]:
+def _row(packet: PacketEvents, report: OnDamage) -> tuple[Any, ...]:
     entry, stream = packet.entry, packet.entry.stream
     header, last = entry.packet.header, packet.last
     if packet.falls_back:

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.declarations import StreamClass
 from msgflow.trace.ctf.field_types import BYTE, Role, Scope
 from msgflow.trace.ctf.layout import DynamicError, Leaf, lay_out
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.declarations import StreamClass
 
 
 @dataclass(frozen=True)
@@ -70,11 +67,6 @@ class EventHeader:
     forms: tuple[Form, ...]
     # Size of the time stamps that are not whole clock values, None if all are.
     narrow_bits: int | None
-
-    @property
-    def largest_size(self) -> int:
-        """Bytes of the longest form."""
-        return max(size for form in self.forms for size in form.sizes)
 
 
 def compile_header(stream: StreamClass, residues: int) -> EventHeader | None:

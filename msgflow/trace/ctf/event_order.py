@@ -7,25 +7,18 @@ large ones are cut into pieces that are read like packets.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Collection, Generator, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Generator, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from msgflow.trace.ctf.events import Events, events_of, joined, say_nothing
-from msgflow.trace.ctf.packet_memory import Loader
-from msgflow.trace.ctf.packet_order import PacketEvents
-from msgflow.trace.ctf.stream_layout import GAP
-from msgflow.trace.numpy_arrow import distinct
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.packet_memory import Memory
-    from msgflow.trace.ctf.packet_order import Entry
-    from msgflow.trace.ctf.stream_layout import StreamLayout
+from msgflow.trace.ctf.packet_memory import Loader, Memory
+from msgflow.trace.ctf.packet_order import Entry, OnDamage, PacketEvents
+from msgflow.trace.ctf.stream_layout import GAP, StreamLayout
+from msgflow.trace.numpy_arrow import Integers, Truths, distinct
 
 _NEVER_NS = 1 << 64
 MOST_EVENTS = 1 << 18
@@ -36,37 +29,26 @@ LARGEST_WHOLE = 2 * PIECE
 
 @dataclass(frozen=True)
 class Batch:
-    """Events that follow those of the batch before in the total order, and their packets."""
+    """What is in memory, and which of the events there follow those of the batch before."""
 
     memory: Memory
     entries: list[Entry]  # the packets in memory, in the order of their rows
     bases: list[int]  # where they lie in memory; `Entry.base` may already belong to a later batch
-    packets: list[PacketEvents]  # summaries of the packets that were in no batch before
-    events: Events  # those in these packets
-    rows: NDArray[np.int64]  # which of them are of the batch, in order
+    is_new: Truths  # which of the packets were not there before
     cpus: NDArray[np.int32]  # the CPU of each packet
-    has_cpu: NDArray[np.bool_] | None  # which packets have one; None if all have
-
-
-@dataclass(frozen=True)
-class _Loaded:
-    """All that is in memory."""
-
-    memory: Memory
-    entries: list[Entry]
-    is_new: NDArray[np.bool_]  # which of the packets were not there before
-    events: Events
-    counts: NDArray[np.int64]  # events of each packet
+    has_cpu: Truths | None  # which packets have one; None if all have
+    counts: Integers  # events of each packet
+    events: Events  # those in these packets
     # Times to order the events by: none is before `Entry.order_ns`, where batches are cut. The
     # order would differ with their size.
-    rank_ns: NDArray[np.int64]
+    rank_ns: Integers
+    rows: Integers = field(default_factory=lambda: np.empty(0, np.int64))  # events, in order
+    # Summaries of the packets that were in no batch before.
+    packets: list[PacketEvents] = field(default_factory=list)
 
 
 def ordered_batches(
-    entries: Sequence[Entry],
-    size: int,
-    report: Callable[[Entry, int, str], None],
-    whole: Collection[StreamLayout] = (),
+    entries: Sequence[Entry], size: int, report: OnDamage, whole: Collection[StreamLayout] = ()
 ) -> Generator[Batch, None, None]:
     """Read packets, about `size` bytes at once, and yield their events in order of time.
 
@@ -98,9 +80,14 @@ def ordered_batches(
             until_ns = unread[0][0] if unread else _NEVER_NS
             loaded = _load(loader, held, new, report)
             packets += _packets(loaded)
-            yield from _parts(loaded, packets, _order(loaded, are_cut, since_ns, until_ns))
+            order = _order(loaded, are_cut, since_ns, until_ns)
+            # In parts: columns of all events of large packets take much memory.
+            for begin in range(0, max(order.size, 1), MOST_EVENTS):
+                yield replace(loaded, rows=order[begin : begin + MOST_EVENTS], packets=packets)
+                packets = []
             held, are_cut = _unfinished(loaded, until_ns)
-            _forget(loaded.entries, held)
+            for entry in {*loaded.entries} - {*held}:
+                entry.events = None
             since_ns = until_ns
             # Free its memory before the next packets are loaded.
             del loaded
@@ -108,17 +95,12 @@ def ordered_batches(
         loader.close()
 
 
-def _load(
-    loader: Loader,
-    held: Sequence[Entry],
-    new: Sequence[Entry],
-    report: Callable[[Entry, int, str], None],
-) -> _Loaded:
+def _load(loader: Loader, held: Sequence[Entry], new: Sequence[Entry], report: OnDamage) -> Batch:
     entries = sorted([*held, *new], key=lambda entry: entry.place)
-    is_held = set(map(id, held))
+    is_held = {*held}
 
     def report_once(entry: Entry, offset: int, message: str) -> None:
-        if id(entry) not in is_held:
+        if entry not in is_held:
             report(entry, offset, message)
 
     for entry in loader.load(entries):
@@ -132,14 +114,21 @@ def _load(
         number += len(of_layout)
     events = joined(parts)
     counts = np.diff(np.searchsorted(events.packets, np.arange(len(entries) + 1)))
-    is_new = np.array([id(entry) not in is_held for entry in entries])
-    rank_ns = _ranks(entries, counts, events.ts_ns)
-    return _Loaded(loader.memory, entries, is_new, events, counts, rank_ns)
+    cpus = [entry.packet.header.cpu for entry in entries]
+    return Batch(
+        memory=loader.memory,
+        entries=entries,
+        bases=[entry.base for entry in entries],
+        is_new=np.array([entry not in is_held for entry in entries]),
+        cpus=np.array([cpu or 0 for cpu in cpus], np.uint64).astype(np.int32),
+        has_cpu=np.array([cpu is not None for cpu in cpus]) if None in cpus else None,
+        counts=counts,
+        events=events,
+        rank_ns=_ranks(entries, counts, events.ts_ns),
+    )
 
 
-def _ranks(
-    entries: Sequence[Entry], counts: NDArray[np.int64], ts_ns: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _ranks(entries: Sequence[Entry], counts: Integers, ts_ns: Integers) -> Integers:
     begins = np.array([entry.order_ns for entry in entries], np.int64)
     filled = np.flatnonzero(counts)
     first = (np.cumsum(counts) - counts)[filled]
@@ -149,13 +138,13 @@ def _ranks(
     return np.maximum(ts_ns, np.repeat(begins, counts))
 
 
-def _order(loaded: _Loaded, are_cut: bool, since_ns: int, until_ns: int) -> NDArray[np.int64]:
+def _order(loaded: Batch, are_cut: bool, since_ns: int, until_ns: int) -> Integers:
     """Return the rows of the events before `until_ns` in the total order.
 
     Unless `are_cut`, held packets have events that are done: those before `since_ns`.
     """
     rank_ns = loaded.rank_ns
-    rows: NDArray[np.int64] | None = None
+    rows: Integers | None = None
     if not are_cut:
         waits = loaded.is_new[loaded.events.packets] | (rank_ns >= since_ns)
         rows = np.flatnonzero(waits)
@@ -168,27 +157,7 @@ def _order(loaded: _Loaded, are_cut: bool, since_ns: int, until_ns: int) -> NDAr
     return order
 
 
-def _parts(
-    loaded: _Loaded, packets: list[PacketEvents], order: NDArray[np.int64]
-) -> Iterator[Batch]:
-    """Yield what is loaded in parts: columns of all events of large packets take much memory."""
-    bases = [entry.base for entry in loaded.entries]
-    cpus = [entry.packet.header.cpu for entry in loaded.entries]
-    for begin in range(0, max(order.size, 1), MOST_EVENTS):
-        yield Batch(
-            memory=loaded.memory,
-            entries=loaded.entries,
-            bases=bases,
-            packets=packets,
-            events=loaded.events,
-            rows=order[begin : begin + MOST_EVENTS],
-            cpus=np.array([cpu or 0 for cpu in cpus], np.uint64).astype(np.int32),
-            has_cpu=np.array([cpu is not None for cpu in cpus]) if None in cpus else None,
-        )
-        packets = []
-
-
-def _packets(loaded: _Loaded) -> Iterator[PacketEvents]:
+def _packets(loaded: Batch) -> Iterator[PacketEvents]:
     """Yield summaries of the new packets; `cut` makes those of packets in pieces."""
     ts_ns, clock, owners = loaded.events.ts_ns, loaded.events.clock, loaded.events.packets
     falls = np.flatnonzero(ts_ns[1:] < ts_ns[:-1]) + 1
@@ -209,7 +178,7 @@ def _packets(loaded: _Loaded) -> Iterator[PacketEvents]:
         )
 
 
-def _unfinished(loaded: _Loaded, until_ns: int) -> tuple[list[Entry], bool]:
+def _unfinished(loaded: Batch, until_ns: int) -> tuple[list[Entry], bool]:
     """Return the packets with events at or after this time, and whether they have no others left.
 
     Others are left if time runs backward in a packet.
@@ -223,14 +192,8 @@ def _unfinished(loaded: _Loaded, until_ns: int) -> tuple[list[Entry], bool]:
     ends = np.cumsum(loaded.counts)[packets]
     begins = ends - loaded.counts[packets]
     held, are_cut = [], True
-    for packet, begin, at, end, count in zip(
-        packets.tolist(),
-        begins.tolist(),
-        late[first].tolist(),
-        ends.tolist(),
-        counts.tolist(),
-        strict=True,
-    ):
+    columns = (packets, begins, late[first], ends, counts)
+    for packet, begin, at, end, count in zip(*(c.tolist() for c in columns), strict=True):
         entry = loaded.entries[packet]
         held.append(entry)
         assert entry.events is not None
@@ -243,16 +206,7 @@ def _unfinished(loaded: _Loaded, until_ns: int) -> tuple[list[Entry], bool]:
     return held, are_cut
 
 
-def _forget(entries: Sequence[Entry], held: Sequence[Entry]) -> None:
-    kept = set(map(id, held))
-    for entry in entries:
-        if id(entry) not in kept:
-            entry.events = None
-
-
-def cut(
-    loader: Loader, entry: Entry, report: Callable[[Entry, int, str], None]
-) -> tuple[PacketEvents, list[Entry]] | None:
+def cut(loader: Loader, entry: Entry, report: OnDamage) -> tuple[PacketEvents, list[Entry]] | None:
     """Return a packet's times and counts, and its pieces in order of time.
 
     Its events are found once, for all pieces; `report` is called for damage. None says that the

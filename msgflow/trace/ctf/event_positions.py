@@ -13,17 +13,13 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msgflow.trace.ctf.field_types import FieldError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.packet_memory import Memory
-    from msgflow.trace.ctf.stream_layout import Span, StreamLayout
+from msgflow.trace.ctf.packet_memory import Memory
+from msgflow.trace.ctf.stream_layout import Span, StreamLayout
+from msgflow.trace.numpy_arrow import Integers, Truths
 
 BEYOND_END = "an event goes beyond the end of the packet"
 
@@ -45,7 +41,7 @@ _NOWHERE = -1
 class Found:
     """The events of a packet, up to its damage if it has any."""
 
-    positions: NDArray[np.int64]  # bytes of memory at which event headers begin, ascending
+    positions: Integers  # bytes of memory at which event headers begin, ascending
     # The byte of memory that cannot be read, and why; None if all is well.
     problem: tuple[int, str] | None = None
 
@@ -54,10 +50,10 @@ class Found:
 class Lanes:
     """Stretches of packets, in the order of memory, without gaps."""
 
-    spans: NDArray[np.int64]  # which packet each belongs to
+    spans: Integers  # which packet each belongs to
     # Where it begins, in bytes of memory; a guess unless the packet begins there.
-    begins: NDArray[np.int64]
-    ends: NDArray[np.int64]  # where the next one begins, or the packet ends
+    begins: Integers
+    ends: Integers  # where the next one begins, or the packet ends
 
 
 def find_positions(layout: StreamLayout, memory: Memory, spans: Sequence[Span]) -> list[Found]:
@@ -100,9 +96,7 @@ def split(layout: StreamLayout, memory: Memory, spans: Sequence[Span]) -> Lanes:
     return Lanes(numbers[owners], begins, ends)
 
 
-def guess(
-    layout: StreamLayout, memory: Memory, targets: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def guess(layout: StreamLayout, memory: Memory, targets: Integers) -> tuple[Integers, Integers]:
     """Return where events seem to begin behind some bytes, and behind which of them each is.
 
     From any byte, the sizes of events soon lead to the begin of an event, and from there to begins
@@ -130,7 +124,7 @@ def guess(
     return ends[order[middle]], found
 
 
-def _sizes(layout: StreamLayout, memory: Memory, positions: NDArray[np.int64]) -> NDArray[np.int64]:
+def _sizes(layout: StreamLayout, memory: Memory, positions: Integers) -> Integers:
     """Return the sizes of the events at these bytes of memory.
 
     They are 0 where the size varies within the class, or where no event begins.
@@ -143,7 +137,7 @@ def _sizes(layout: StreamLayout, memory: Memory, positions: NDArray[np.int64]) -
         selector = selector >> place.shift
     selector = np.minimum(selector & place.mask, len(table) - 1)
     if layout.residues == 1:
-        sizes: NDArray[np.int64] = table[:, 0][selector]
+        sizes: Integers = table[:, 0][selector]
     else:
         sizes = table[selector, positions & (layout.residues - 1)]
     return sizes
@@ -216,7 +210,7 @@ class SideBySide:
         # Where each lane came to, at or behind its end.
         self._reached = np.full(lanes.begins.size, _NOWHERE)
         self._problems: dict[int, tuple[int, str]] = {}
-        self._found: list[NDArray[np.int64]] = []
+        self._found: list[Integers] = []
 
     def run(self) -> list[Found]:
         """Return the events of each packet."""
@@ -243,9 +237,7 @@ class SideBySide:
             for number, span in enumerate(self._spans)
         ]
 
-    def _joined(
-        self, number: int, positions: NDArray[np.int64], bounds: NDArray[np.int64], lanes: range
-    ) -> Found:
+    def _joined(self, number: int, positions: Integers, bounds: Integers, lanes: range) -> Found:
         """Return the events of a packet that is damaged, or where a guess was wrong."""
         span = self._spans[number]
         at = span.begin
@@ -265,9 +257,7 @@ class SideBySide:
         found = Found(np.concatenate(parts), problem)
         return _without_cut_event(self._layout, self._memory, span, found, at)
 
-    def _walk(
-        self, lanes: NDArray[np.int64], position: NDArray[np.int64], end: NDArray[np.int64]
-    ) -> None:
+    def _walk(self, lanes: Integers, position: Integers, end: Integers) -> None:
         """Let all lanes take steps until few are left, which go on one by one."""
         while lanes.size >= FEWEST_LANES:
             size = _sizes(self._layout, self._memory, position)
@@ -290,9 +280,7 @@ class SideBySide:
             else:
                 self._problems[lane] = rest.problem
 
-    def _look_at_stopped(
-        self, lanes: NDArray[np.int64], position: NDArray[np.int64], size: NDArray[np.int64]
-    ) -> NDArray[np.bool_]:
+    def _look_at_stopped(self, lanes: Integers, position: Integers, size: Integers) -> Truths:
         """Fill in the sizes that are not in the table; return which lanes go on."""
         going = np.ones(lanes.size, np.bool_)
         for index in np.flatnonzero(size == 0).tolist():

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from msgflow.trace.ctf.declarations import Clock
+from msgflow.trace.ctf.event_header import Form, Place
 from msgflow.trace.ctf.event_positions import find_positions
 from msgflow.trace.ctf.field_reader import EventReader
 from msgflow.trace.ctf.field_types import BYTE, FieldError
-from msgflow.trace.numpy_arrow import distinct
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.clock import Clock
-    from msgflow.trace.ctf.event_header import Form, Place
-    from msgflow.trace.ctf.packet_memory import Memory
-    from msgflow.trace.ctf.packet_order import Entry
-    from msgflow.trace.ctf.stream_layout import StreamLayout
+from msgflow.trace.ctf.packet_memory import Memory
+from msgflow.trace.ctf.packet_order import Entry, OnDamage
+from msgflow.trace.ctf.stream_layout import StreamLayout
+from msgflow.trace.numpy_arrow import Integers, Values, distinct
 
 # Some tracers end packets too early, but not by a day.
 _SLACK_SECONDS = 86_400
@@ -33,13 +30,13 @@ class Events:
     packets: NDArray[np.int32]  # which packet each is in
     classes: NDArray[np.uint32]  # numbers of their classes
     clock: NDArray[np.uint64]  # values of the clock
-    ts_ns: NDArray[np.int64]
-    bodies: NDArray[np.int64]  # where contexts and payload begin: bytes of memory
+    ts_ns: Integers
+    bodies: Integers  # where contexts and payload begin: bytes of memory
     # Where headers begin: bytes of memory, or bits of the packet in streams whose headers are read
     # field by field.
-    positions: NDArray[np.int64]
+    positions: Integers
 
-    def take(self, rows: NDArray[Any]) -> Events:
+    def take(self, rows: Values) -> Events:
         """Return these rows, or those that are true."""
         return Events(*(column[rows] for column in vars(self).values()))
 
@@ -55,8 +52,8 @@ def events_of(
     layout: StreamLayout,
     memory: Memory,
     entries: Sequence[Entry],
-    report: Callable[[Entry, int, str], None],
-    report_absurd: Callable[[Entry, int, str], None],
+    report: OnDamage,
+    report_absurd: OnDamage,
     first: int = 0,
 ) -> Events:
     """Find the events of packets of one stream class, which lie in memory in this order.
@@ -71,10 +68,7 @@ def events_of(
 
 
 def _find_events(
-    layout: StreamLayout,
-    memory: Memory,
-    entries: Sequence[Entry],
-    report: Callable[[Entry, int, str], None],
+    layout: StreamLayout, memory: Memory, entries: Sequence[Entry], report: OnDamage
 ) -> None:
     if layout.header is None:
         for entry in entries:
@@ -112,11 +106,7 @@ def _read_events(
 
 
 def _without_absurd(
-    layout: StreamLayout,
-    entries: Sequence[Entry],
-    events: Events,
-    first: int,
-    report: Callable[[Entry, int, str], None],
+    layout: StreamLayout, entries: Sequence[Entry], events: Events, first: int, report: OnDamage
 ) -> Events:
     if not events.packets.size:
         return events
@@ -152,7 +142,7 @@ def event_reader_of(layout: StreamLayout, memory: Memory, entry: Entry, base: in
 
 def _find_field_by_field(
     layout: StreamLayout, memory: Memory, entry: Entry
-) -> tuple[NDArray[np.int64], tuple[int, str] | None]:
+) -> tuple[Integers, tuple[int, str] | None]:
     """Return at which bits of a packet its events begin, and its damage: a byte, and why."""
     reader = event_reader_of(layout, memory, entry, entry.base)
     end = entry.packet.content_bits
@@ -199,7 +189,7 @@ def _limits(entry: Entry, clock: Clock) -> tuple[int, int]:
     return first, last
 
 
-def _begins(entry: Entry) -> NDArray[np.int64]:
+def _begins(entry: Entry) -> Integers:
     assert entry.events is not None
     return entry.events
 
@@ -207,10 +197,10 @@ def _begins(entry: Entry) -> NDArray[np.int64]:
 def _read_headers(
     layout: StreamLayout,
     memory: Memory,
-    positions: NDArray[np.int64],
-    counts: NDArray[np.int64],
+    positions: Integers,
+    counts: Integers,
     befores: NDArray[np.uint64],
-) -> tuple[NDArray[np.uint32], NDArray[np.uint64], NDArray[np.int64]]:
+) -> tuple[NDArray[np.uint32], NDArray[np.uint64], Integers]:
     """Return class, clock and body of the events at these positions, as `Events` has them.
 
     `positions` are the bytes of memory at which events begin, packet after packet. `counts` are the
@@ -221,20 +211,17 @@ def _read_headers(
     firsts = (np.cumsum(counts) - counts)[counts > 0]
     header = layout.known_header
     selector = reader.gather(header.selector, slice(None))
-    forms = reader.rows_of_forms(selector)
     classes = np.empty(positions.size, np.uint32)
     values = np.empty(positions.size, np.uint64)
     bodies = np.empty(positions.size, np.int64)
     whole = []
-    for form, rows in zip(header.forms, forms, strict=True):
-        if not isinstance(rows, slice) and rows.size == 0:
-            continue
+    for form, rows in reader.rows_of_forms(selector):
         classes[rows] = reader.classes(form, selector, rows)
         bodies[rows] = positions[rows] + reader.by_residue(form.sizes, rows)
         if form.time is not None:
             values[rows] = reader.gather(form.time, rows)
             if form.time.bits == 64:
-                whole.append(np.arange(positions.size) if isinstance(rows, slice) else rows)
+                whole.append(np.arange(positions.size)[rows])
         else:
             values[rows] = np.repeat(befores, counts)[rows]
     if header.narrow_bits is None:
@@ -245,7 +232,7 @@ def _read_headers(
 
 
 class _HeaderColumns:
-    def __init__(self, layout: StreamLayout, memory: Memory, positions: NDArray[np.int64]) -> None:
+    def __init__(self, layout: StreamLayout, memory: Memory, positions: Integers) -> None:
         self._layout = layout
         self._memory = memory
         self._positions = positions
@@ -257,9 +244,9 @@ class _HeaderColumns:
         residue = self._positions[rows] & (self._layout.residues - 1)
         return np.array(values, np.int64)[residue]
 
-    def gather(self, place: Place, rows: Any) -> NDArray[Any]:
+    def gather(self, place: Place, rows: Any) -> Values:
         at = self._positions[rows] + self.by_residue(place.offsets, rows)
-        values: NDArray[Any] = self._memory.view(place.dtype)[at]
+        values: Values = self._memory.view(place.dtype)[at]
         values = values.astype(f"u{place.width}", copy=False)
         if place.shift:
             values = values >> place.shift
@@ -267,12 +254,13 @@ class _HeaderColumns:
             values = values & place.mask
         return values
 
-    def rows_of_forms(self, selector: NDArray[Any]) -> list[Any]:
+    def rows_of_forms(self, selector: Values) -> Iterator[tuple[Form, Any]]:
+        """Yield the forms that headers have, and the rows of each."""
         header = self._layout.known_header
         if len(header.forms) == 1:
-            return [slice(None)]
+            yield header.forms[0], slice(None)
+            return
         remaining = np.arange(selector.size)
-        rows = []
         for form in header.forms:
             matches = np.zeros(remaining.size, np.bool_)
             for first, last in form.choice.ranges if form.choice else ():
@@ -282,15 +270,13 @@ class _HeaderColumns:
                 matches |= (selector[remaining] >= low) & (selector[remaining] <= high)
             if remaining.size == selector.size and matches.all():
                 # The usual case: all events of a batch have the short form.
-                return [
-                    slice(None) if other is form else np.empty(0, np.int64)
-                    for other in header.forms
-                ]
-            rows.append(remaining[matches])
+                yield form, slice(None)
+                return
+            if matches.any():
+                yield form, remaining[matches]
             remaining = remaining[~matches]
-        return rows
 
-    def classes(self, form: Form, selector: NDArray[Any], rows: Any) -> Any:
+    def classes(self, form: Form, selector: Values, rows: Any) -> Any:
         layout = self._layout
         if form.id is None:
             return layout.classes[layout.only_id].number
@@ -309,9 +295,9 @@ class _HeaderColumns:
 def _unwrapped(
     values: NDArray[np.uint64],
     bits: int,
-    firsts: NDArray[np.int64],
+    firsts: Integers,
     befores: NDArray[np.uint64],
-    whole: NDArray[np.int64],
+    whole: Integers,
 ) -> NDArray[np.uint64]:
     """Turn the low bits of a clock into its values.
 

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from msgflow.trace.ctf.event_body import EventBody, Kind
-from msgflow.trace.numpy_arrow import distinct
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.layout import OptionLayout, Part, VariantLayout
-    from msgflow.trace.ctf.packet_memory import Memory
+from msgflow.trace.ctf.event_body import EventBody, Kind, VariantBody
+from msgflow.trace.ctf.packet_memory import Memory
+from msgflow.trace.numpy_arrow import Integers, Values, distinct
 
 _WIDEST_ROW = 256
 _WORD = 8
@@ -30,7 +25,7 @@ class FieldRows:
         self,
         body: EventBody,
         memory: Memory,
-        bodies: NDArray[np.int64],
+        bodies: Integers,
         wanted: Iterable[int],
         *,
         with_variant: bool = False,
@@ -42,24 +37,19 @@ class FieldRows:
         end.
         """
         assert body.fields is not None
+        self._body = body
         self._fields = body.fields
-        # Names of variants and options to the rows that have the option, its begins and layout.
-        self._options: dict[
-            tuple[str, ...], tuple[NDArray[np.int64], NDArray[np.int64], OptionLayout]
-        ] = {}
+        # Names of the variant and of an option to the rows that have the option, and its fields.
+        self._options: dict[tuple[str, ...], tuple[Integers, FieldRows]] = {}
         self._memory = memory
         self._bodies = bodies
-        self._positions: dict[int, NDArray[np.int64]] = {}
-        self._counts: dict[int, NDArray[np.int64]] = {}
-        self._rows: NDArray[Any] | None = None
+        self._positions: dict[int, Integers] = {}
+        self._counts: dict[int, Integers] = {}
+        self._rows: Values | None = None
         self._first = 0
         self._offsets: tuple[int, ...] | None = None
-        if body.variant is not None and with_variant:
-            due = self._follow(len(self._fields) - 1)
-            rows, values = np.arange(bodies.size), self.numbers(body.selector)
-            self._find_options((), body.variant, rows, due, values)
-        elif body.offsets is None:
-            self._follow(max(wanted, default=-1))
+        if body.offsets is None:
+            self._follow(len(self._fields) - 1 if with_variant else max(wanted, default=-1))
         elif len({tuple(offset) for offset in zip(*body.offsets, strict=True)}) <= 1:
             self._offsets = tuple(offset[0] for offset in body.offsets)
             self._take_rows(wanted)
@@ -68,28 +58,23 @@ class FieldRows:
             for number in wanted:
                 table = np.array(body.offsets[number], np.int64)
                 self._positions[number] = bodies + table[residue]
+        if body.variant is not None and with_variant:
+            self._find_options(body.variant)
 
-    def words(self, number: int, dtype: str) -> NDArray[Any]:
+    def words(self, number: int, dtype: str) -> Values:
         """Return the bytes at a field as this type, a value for each row."""
         if self._rows is not None and self._offsets is not None:
             at = self._offsets[number] - self._first
-            if at + np.dtype(dtype).itemsize <= self._rows.dtype.itemsize:
-                column = np.dtype(
-                    {
-                        "names": ["word"],
-                        "formats": [dtype],
-                        "offsets": [at],
-                        "itemsize": self._rows.dtype.itemsize,
-                    }
-                )
-                return self._rows.view(column)["word"]
+            width = self._rows.itemsize
+            if at + np.dtype(dtype).itemsize <= width:
+                return np.ndarray(self._rows.shape, dtype, self._rows, at, (width,))
         return self._memory.view(dtype)[self._position(number)]
 
-    def numbers(self, number: int) -> NDArray[Any]:
+    def numbers(self, number: int) -> Values:
         """Return the values of a field that is a number."""
         return self.words(number, self._fields[number].dtype)
 
-    def elements(self, number: int) -> tuple[NDArray[np.int64], NDArray[Any]]:
+    def elements(self, number: int) -> tuple[Integers, Values]:
         """Return the elements of an array or sequence: offsets of the rows, and all elements."""
         field = self._fields[number]
         count = self._counts.get(number)
@@ -98,7 +83,7 @@ class FieldRows:
         offsets, at = _flat(self._position(number), count, field.width)
         return offsets, self._memory.view(field.dtype)[at]
 
-    def text(self, number: int) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+    def text(self, number: int) -> tuple[Integers, NDArray[np.uint8]]:
         """Return a text, cut at its first NUL: offsets of the rows, and all bytes."""
         offsets, content = self.elements(number)
         content = content.view(np.uint8)
@@ -110,20 +95,25 @@ class FieldRows:
         cut, at = _flat(offsets[:-1], lengths, 1)
         return cut, content[at]
 
-    def in_variant(self, path: tuple[str, ...]) -> tuple[NDArray[np.int64], NDArray[Any]] | None:
+    def in_variant(self, path: tuple[str, ...]) -> tuple[Integers, Values] | None:
         """Return the rows that have a field of the variant, and its values; None if no row has it.
 
         The values of an array have a column for each element. The path is the names of the
         variants, their options and the structures around the field, and its own.
         """
-        for depth in range(2, len(path)):
-            rows, at, option = self._options.get(path[:depth], (None, None, None))
-            part = None if option is None else option.parts.get(".".join(path[depth:]))
-            if rows is not None and at is not None and part is not None:
-                return rows, _values(self._memory, at, part)
-        return None
+        rows, option = self._options.get(path[:2], (None, None))
+        if rows is None or option is None:
+            return None
+        number = option._body.places.get(path[2:])
+        if number is None:
+            inner = option.in_variant(path[2:])
+            return None if inner is None else (rows[inner[0]], inner[1])
+        field = option._fields[number]
+        if field.kind is Kind.NUMBER:
+            return rows, option.numbers(number)
+        return rows, option.elements(number)[1].reshape(rows.size, field.count)
 
-    def _position(self, number: int) -> NDArray[np.int64]:
+    def _position(self, number: int) -> Integers:
         if self._offsets is not None:
             return self._bodies + self._offsets[number]
         return self._positions[number]
@@ -143,8 +133,8 @@ class FieldRows:
             width = max(last - first, 1)
             self._rows = self._memory.view(f"V{width}")[self._bodies + first]
 
-    def _follow(self, last: int) -> NDArray[np.int64]:
-        """Find where fields begin, up to the field `last`, as places vary; return where it ends."""
+    def _follow(self, last: int) -> None:
+        """Find where fields begin, up to the field `last`, as places vary."""
         at = self._bodies
         for number, field in enumerate(self._fields[: last + 1]):
             if field.align > 1:
@@ -159,40 +149,22 @@ class FieldRows:
                 count = self.numbers(field.length_at).astype(np.int64)
                 self._counts[number] = count
                 at = at + count * field.width
-        return at
 
-    def _find_options(
-        self,
-        path: tuple[str, ...],
-        variant: VariantLayout,
-        rows: NDArray[np.int64],
-        due: NDArray[np.int64],
-        values: NDArray[Any],
-    ) -> None:
-        """Find the rows of each option of a variant that is due at these bytes of memory."""
+    def _find_options(self, variant: VariantBody) -> None:
+        """Find the rows of each option of the variant behind the fields."""
+        due = self._position(len(self._fields) - 1)
+        values = self.numbers(variant.selector)
         present = distinct(values).tolist()
         for option in variant.options:
             choosing = [value for value in present if variant.option(value) is option]
-            if not choosing:
-                continue
-            is_chosen = np.isin(values, choosing)
-            chosen, at = rows[is_chosen], (due[is_chosen] + (option.align - 1)) & -option.align
-            inner = (*path, variant.name, option.choice.name)
-            self._options[inner] = chosen, at, option
-            if option.variant is not None:
-                selected = _values(self._memory, at, option.parts[option.variant.selector])
-                self._find_options(inner, option.variant, chosen, at + option.size, selected)
+            if choosing:
+                rows = np.flatnonzero(np.isin(values, choosing))
+                begins = (due[rows] + (option.align - 1)) & -option.align
+                fields = FieldRows(option.body, self._memory, begins, (), with_variant=True)
+                self._options[variant.name, option.choice.name] = rows, fields
 
 
-def _values(memory: Memory, at: NDArray[np.int64], part: Part) -> NDArray[Any]:
-    places = at + part.offset
-    if part.count is not None:
-        places = places[:, np.newaxis] + np.arange(part.count) * part.width
-    values: NDArray[Any] = memory.view(part.dtype)[places]
-    return values
-
-
-def text_lengths(memory: Memory, begins: NDArray[np.int64]) -> NDArray[np.int64]:
+def text_lengths(memory: Memory, begins: Integers) -> Integers:
     """Return the number of bytes in front of the next NUL; there must be one."""
     lengths = np.zeros(begins.size, np.int64)
     at = begins
@@ -216,9 +188,7 @@ def text_lengths(memory: Memory, begins: NDArray[np.int64]) -> NDArray[np.int64]
     return lengths
 
 
-def _flat(
-    begins: NDArray[np.int64], counts: NDArray[np.int64], width: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _flat(begins: Integers, counts: Integers, width: int) -> tuple[Integers, Integers]:
     """Return offsets of rows among all their elements, and where each element begins."""
     offsets = np.zeros(counts.size + 1, np.int64)
     np.cumsum(counts, out=offsets[1:])

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
 from msgflow.trace.ctf.field_types import BYTE, FieldError, Reference, Role, Scope, aligned
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
 
 _MOST_EMPTY_ELEMENTS = 1 << 16
 _MOST_VARIABLE_BYTES = 10

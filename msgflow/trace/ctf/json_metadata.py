@@ -10,16 +10,8 @@ from typing import Any
 from uuid import UUID
 
 from msgflow.trace.ctf import field_types as ctf
-from msgflow.trace.ctf.clock import Clock
-from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
-from msgflow.trace.ctf.field_types import (
-    BYTE,
-    MetadataError,
-    Reference,
-    Scope,
-    integer_of,
-    may_have,
-)
+from msgflow.trace.ctf.declarations import Clock, EventClass, StreamClass, TraceClass
+from msgflow.trace.ctf.field_types import BYTE, MetadataError, Scope, integer_of, may_have
 
 _SEPARATOR = "\x1e"
 # Larger than any number that makes sense, and short enough for a message.
@@ -85,7 +77,13 @@ def parse(text: str) -> TraceClass:
                 stream_id = integer_of(fragment, "data-stream-class-id", 0)
                 if stream_id not in trace.streams:
                     raise MetadataError(f"there is no stream class {stream_id}")
-                trace.add_event(trace.streams[stream_id], _event_class(fragment, types))
+                event = EventClass(
+                    id=integer_of(fragment, "id", 0),
+                    name=str(fragment.get("name", "")),
+                    specific_context=types.structure(fragment, "specific-context-field-class"),
+                    payload=types.structure(fragment, "payload-field-class"),
+                )
+                trace.add_event(trace.streams[stream_id], event)
             case other:
                 raise MetadataError(f"unknown fragment {other!r}")
     return trace
@@ -135,15 +133,6 @@ def _stream_class(
         event_header=types.structure(fragment, "event-record-header-field-class"),
         event_context=types.structure(fragment, "event-record-common-context-field-class"),
         clock=None if name is None else clocks[str(name)],
-    )
-
-
-def _event_class(fragment: dict[str, Any], types: TypeReader) -> EventClass:
-    return EventClass(
-        id=integer_of(fragment, "id", 0),
-        name=str(fragment.get("name", "")),
-        specific_context=types.structure(fragment, "specific-context-field-class"),
-        payload=types.structure(fragment, "payload-field-class"),
     )
 
 
@@ -320,7 +309,7 @@ def _objects(declared: dict[str, Any], key: str) -> list[dict[str, Any]]:
     return objects
 
 
-def _reference(declared: dict[str, Any], key: str) -> Reference:
+def _reference(declared: dict[str, Any], key: str) -> ctf.Reference:
     location = declared.get(key)
     origin, path = None, location
     if isinstance(location, dict):
@@ -332,7 +321,7 @@ def _reference(declared: dict[str, Any], key: str) -> Reference:
     if origin is not None and origin not in _ORIGINS:
         raise MetadataError(f"there is no origin {origin!r}")
     names = tuple(None if name is None else str(name) for name in path)
-    return Reference(None if origin is None else _ORIGINS[origin], names)
+    return ctf.Reference(None if origin is None else _ORIGINS[origin], names)
 
 
 def _check_encoding(declared: dict[str, Any]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 if TYPE_CHECKING:
     from msgflow.trace.ctf.packets import Packet, Stream
@@ -34,12 +35,8 @@ class LossCounter:
 
     def __init__(self) -> None:
         self._counters: dict[Recording, int] = {}
-        self._of_stream: dict[int, int] = {}
+        self._of_stream: WeakKeyDictionary[Stream, int] = WeakKeyDictionary()
         self._sequences: dict[Recording, int] = {}
-
-    def enter_part(self) -> None:
-        """Begin to read further streams: none of those before goes on, but their recordings do."""
-        self._of_stream.clear()
 
     def losses(self, recording: Recording, stream: Stream, packet: Packet, counts: bool) -> Losses:
         """Return what was lost in a packet and before it.
@@ -58,12 +55,12 @@ class LossCounter:
                 self._sequences[recording] = expected
         if header.discarded is None:
             return Losses(None if packet.is_cut else 0, lost, problem)
-        before = self._of_stream.get(id(stream), self._counters.get(recording, 0))
+        before = self._of_stream.get(stream, self._counters.get(recording, 0))
         discarded: int | None = _rise(before, header.discarded, header.discarded_bits)
         if discarded is not None and discarded > _MOST_LOST:
             problem = f"the counter of lost events makes no sense: {header.discarded}"
             return Losses(None, lost, problem)
-        self._of_stream[id(stream)] = header.discarded
+        self._of_stream[stream] = header.discarded
         if counts:
             self._counters[recording] = header.discarded
         if packet.is_cut or (lost and discarded):

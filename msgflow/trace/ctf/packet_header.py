@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 from uuid import UUID
 
 from msgflow.trace.ctf import field_types as ctf
+from msgflow.trace.ctf.declarations import StreamClass, TraceClass
 from msgflow.trace.ctf.field_reader import FieldReader
 from msgflow.trace.ctf.field_types import BYTE, FieldError, MetadataError, Role, Scope
 from msgflow.trace.ctf.layout import DynamicError, Leaf, lay_out
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.declarations import StreamClass, TraceClass
 
 MAGIC = 0xC1FC1FC1
 _LONGEST_HEADER = 1 << 16

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import os
 import struct
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from msgflow.trace.regular_file import UnsuitableFileError, read_regular
 
 DIRECTORY: Final = "index"
 """Name of the directory beside the streams that has the indexes."""
-
-Recording = tuple[Any, int, int]
-"""Trace uuid (or path), stream class and stream instance: equal in all directories."""
 
 _SUFFIX: Final = ".idx"
 _MAGIC: Final = 0xC1F1DCC1
@@ -85,33 +81,11 @@ def content_bytes(index: Path) -> int:
     return sum(entry.content_bits for entry in _entries(content)) // 8
 
 
-class DiscardCounters:
-    """Counters of lost events, which continue through the directories of a recording.
+def first_counter(directory: Path, class_id: int, instance_id: int) -> int | None:
+    """Return how many events a stream had lost up to the end of its first packet.
 
-    Babeltrace hides them.
+    None: the index is missing or cut off.
     """
-
-    def __init__(self) -> None:
-        self._counters: Counter[Recording] = Counter()
-
-    def rise(self, recording: Recording, directory: Path, told: int | None) -> int | None:
-        """Return how many events were lost before a packet; None where nothing tells it.
-
-        `told` is the number that Babeltrace tells: None for the first packet of a directory.
-        """
-        before = self._counters[recording]
-        if told is None:
-            counter = _first_counter(directory, *recording[1:])
-            if counter is None:
-                return None
-            told = counter - before if counter >= before else counter
-            before = counter - told
-        self._counters[recording] = before + told
-        return told
-
-
-def _first_counter(directory: Path, class_id: int, instance_id: int) -> int | None:
-    """Return the counter of the first packet of a stream; an index may be missing or cut off."""
     firsts = []
     for path in _indexes(directory):
         try:

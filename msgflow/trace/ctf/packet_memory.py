@@ -6,16 +6,12 @@ import os
 import weakref
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from msgflow.trace.ctf.packet_order import Entry
 from msgflow.trace.ctf.stream_layout import GAP
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.packet_order import Entry
+from msgflow.trace.numpy_arrow import Values
 
 PADDING = 2 * GAP
 """Bytes behind all packets."""
@@ -28,11 +24,10 @@ class Memory:
     """Bytes that Python and numpy share."""
 
     def __init__(self, data: bytearray) -> None:
-        self.data = data  # for Python
-        self.bytes: NDArray[np.uint8] = np.frombuffer(self.data, np.uint8)  # for numpy
-        self._views: dict[str, NDArray[Any]] = {}
+        self.data = data
+        self._views: dict[str, Values] = {}
 
-    def view(self, dtype: str) -> NDArray[Any]:
+    def view(self, dtype: str) -> Values:
         """Return an array whose n-th element begins at the n-th byte."""
         found = self._views.get(dtype)
         if found is None:

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.losses import LossCounter
-    from msgflow.trace.ctf.packets import Packet, Stream
-    from msgflow.trace.model import TraceInfo
+from msgflow.trace.ctf.losses import LossCounter
+from msgflow.trace.ctf.packets import Packet, Stream
+from msgflow.trace.model import TraceInfo
+from msgflow.trace.numpy_arrow import Integers
 
 _CHUNK = 1 << 20
 
@@ -33,7 +29,7 @@ class Entry:
     base: int = -1  # where it lies in memory, in bytes
     # Begins of its events relative to `base`, without those that are done; None until they are
     # found.
-    events: NDArray[np.int64] | None = field(default=None)
+    events: Integers | None = field(default=None)
     # Value of the clock at the event before these, or at the begin.
     clock_before: int = field(init=False)
     skipped: int = 0  # of a piece of a packet, bytes in front of it, which are read before
@@ -54,6 +50,10 @@ class Entry:
         return self.stream.rank, self.position, self.skipped
 
 
+OnDamage = Callable[[Entry, int, str], None]
+"""What gets damage: the packet, where in it (in bytes), and a message."""
+
+
 @dataclass(frozen=True)
 class PacketEvents:
     """Summary of the events of a packet."""
@@ -71,7 +71,7 @@ def entries_of(
     traces: Sequence[TraceInfo],
     begins: Mapping[Packet, tuple[int, int]],
     counter: LossCounter,
-    report: Callable[[Entry, int, str], None],
+    report: OnDamage,
 ) -> tuple[list[Entry], int, Mapping[int, int]]:
     """Return the packets to read, in order of time and without copies.
 
@@ -104,7 +104,6 @@ def entries_of(
             owners.setdefault((uuid, stream.class_id, stream.instance, begin), stream.trace_index)
 
     entries = []
-    counter.enter_part()
     copies = 0
     seen: dict[tuple[object, ...], Packet] = {}
     repeated: dict[int, int] = {}

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import numpy as np
+from numpy.typing import NDArray
 
 from msgflow.trace.ctf.events import events_of, say_nothing
 from msgflow.trace.ctf.packet_memory import Loader
 from msgflow.trace.ctf.packet_order import Entry
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.packets import Packet, Stream
+from msgflow.trace.ctf.packets import Packet, Stream
 
 
 def begins_of(stream: Stream) -> dict[Packet, tuple[int, int]]:

@@ -6,17 +6,13 @@ import os
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf import packet_index
 from msgflow.trace.ctf.field_types import BYTE, FieldError
+from msgflow.trace.ctf.packet_header import HeaderReader, PacketHeader
+from msgflow.trace.ctf.stream_layout import StreamLayout
 from msgflow.trace.regular_file import UnsuitableFileError
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.packet_header import HeaderReader, PacketHeader
-    from msgflow.trace.ctf.stream_layout import StreamLayout
 
 _CHUNK = 1 << 20
 # Buffers of tracers are far smaller; a packet is loaded as a whole.
@@ -42,14 +38,12 @@ class Packet:
     is_cut: bool = False  # the file ends before the packet does
 
 
-def packets_of(
-    path: Path, reader: HeaderReader, report: Callable[[Path, int, int, str], None]
-) -> list[Packet]:
-    """Return the packets of a file in its order.
+OnFileDamage = Callable[[Path, int, int, str], None]
+"""What gets damage: the file, the number of the packet, where in the file (in bytes), a message."""
 
-    `report` gets all that is wrong: the file, the number of the packet, the offset in bytes and a
-    message.
-    """
+
+def packets_of(path: Path, reader: HeaderReader, report: OnFileDamage) -> list[Packet]:
+    """Return the packets of a file in its order; `report` gets all that is wrong."""
     with path.open("rb", buffering=0) as file:
         packets = list(_PacketFinder(path, file.fileno(), reader, report).run())
     early = misplaced([packet.header.begin or 0 for packet in packets])
@@ -62,19 +56,16 @@ def packets_of(
 
 class _PacketFinder:
     def __init__(
-        self,
-        path: Path,
-        descriptor: int,
-        reader: HeaderReader,
-        report: Callable[[Path, int, int, str], None],
+        self, path: Path, descriptor: int, reader: HeaderReader, report: OnFileDamage
     ) -> None:
         self._path = path
         self._descriptor = descriptor
         self._reader = reader
-        self._say = partial(report, path)
+        self._report = report
         status = os.fstat(descriptor)
         self._file_size = status.st_size
         self._is_sparse = status.st_blocks * _BLOCK < status.st_size
+        self._number = self._offset = 0  # of the packet that is looked at
         self._foreign: set[str] = set()
         self._patterns = [pattern for pattern in [reader.pattern()] if pattern is not None]
         try:
@@ -84,24 +75,27 @@ class _PacketFinder:
             report(packet_index.path_of(path), 0, 0, f"the index is not used: {error.strerror}")
 
     def run(self) -> Iterator[Packet]:
-        offset = number = 0
-        while offset < self._file_size:
+        while self._offset < self._file_size:
             try:
-                packet = self._packet(offset, number)
+                packet = self._packet()
             except FieldError as error:
-                self._say(number, offset, str(error))
-                offset = self._next_begin(offset)
+                self._say(str(error))
+                self._offset = self._next_begin()
             else:
                 if not packet.is_cut:
                     self._compare_with_index(packet)
                 yield packet
-                offset += packet.size
-            number += 1
-        last = max(self._index, default=-1)
-        if last >= self._file_size:
-            self._say(number, self._file_size, "the file ends before packets of its index")
+                self._offset += packet.size
+            self._number += 1
+        if max(self._index, default=-1) >= self._file_size:
+            self._offset = self._file_size
+            self._say("the file ends before packets of its index")
 
-    def _packet(self, offset: int, number: int) -> Packet:
+    def _say(self, message: str) -> None:
+        self._report(self._path, self._number, self._offset, message)
+
+    def _packet(self) -> Packet:
+        number, offset = self._number, self._offset
         header = self._reader.read(os.pread(self._descriptor, self._reader.size, offset))
         rest = self._file_size - offset
         size_bits = rest * BYTE if header.size_bits is None else header.size_bits
@@ -114,23 +108,23 @@ class _PacketFinder:
         if content_bits > _LARGEST_CONTENT * BYTE:
             raise FieldError(f"a packet of {content_bits // BYTE:,} bytes is too large to be read")
         self._check_times(header)
-        self._check_uuid(header, offset, number)
+        self._check_uuid(header)
         if header.cpu is not None and not 0 <= header.cpu <= _LARGEST_CPU:
-            self._say(number, offset, f"there is no CPU {header.cpu}: left out")
+            self._say(f"there is no CPU {header.cpu}: left out")
             header = replace(header, cpu=None)
         if size > rest:
-            is_last = self._next_begin(offset) == self._file_size
+            is_last = self._next_begin() == self._file_size
             if not is_last or header.events_at > rest * BYTE:
                 raise FieldError(_CUT)
-            self._say(number, offset, f"{_CUT}; what is there of it is read")
+            self._say(f"{_CUT}; what is there of it is read")
             there = min(content_bits, rest * BYTE)
             return Packet(self._path, number, offset, rest, there, header, is_cut=True)
-        size = self._without_swallowed(offset, size, content_bits, number)
-        there = self._bits_before_hole(offset, content_bits)
+        size = self._without_swallowed(size, content_bits)
+        there = self._bits_before_hole(content_bits)
         if there < content_bits:
             if there < header.events_at:
                 raise FieldError(_HOLE)
-            self._say(number, offset, f"{_HOLE}; what is in front of it is read")
+            self._say(f"{_HOLE}; what is in front of it is read")
             return Packet(self._path, number, offset, size, there, header, is_cut=True)
         return Packet(self._path, number, offset, size, content_bits, header)
 
@@ -145,7 +139,7 @@ class _PacketFinder:
         if header.begin is not None and header.end and header.end < header.begin:
             raise FieldError("the packet ends before it begins")
 
-    def _check_uuid(self, header: PacketHeader, offset: int, number: int) -> None:
+    def _check_uuid(self, header: PacketHeader) -> None:
         """Report once a uuid that is not that of the metadata; read on, as Babeltrace does."""
         if header.foreign is None or header.foreign in self._foreign:
             return
@@ -154,17 +148,16 @@ class _PacketFinder:
             self._patterns.append(pattern)
         self._foreign.add(header.foreign)
         self._say(
-            number,
-            offset,
             f"the packet belongs to another trace, {header.foreign}: read nevertheless, as this "
             "metadata says",
         )
 
-    def _bits_before_hole(self, offset: int, content_bits: int) -> int:
+    def _bits_before_hole(self, content_bits: int) -> int:
         """Return how many bits of a packet lie in front of the first large hole of the file."""
         if not self._is_sparse:
             return content_bits
-        at, end = offset, offset + (content_bits + BYTE - 1) // BYTE
+        at = offset = self._offset
+        end = offset + (content_bits + BYTE - 1) // BYTE
         while at < end:
             hole = os.lseek(self._descriptor, at, os.SEEK_HOLE)
             at = self._next_data(hole)
@@ -179,23 +172,23 @@ class _PacketFinder:
         except OSError:
             return self._file_size
 
-    def _without_swallowed(self, offset: int, size: int, content_bits: int, number: int) -> int:
+    def _without_swallowed(self, size: int, content_bits: int) -> int:
         """Return the size of a packet, cut where another packet lies in its unused end."""
         used = (content_bits + BYTE - 1) // BYTE
         if not self._patterns or size - used < len(self._patterns[0]):
             return size
-        found = self._find(offset + used, offset + size)
+        found = self._find(self._offset + used, self._offset + size)
         if found is None:
             return size
-        self._say(number, offset, "another packet lies where this one says to be unused")
-        return found - offset
+        self._say("another packet lies where this one says to be unused")
+        return found - self._offset
 
-    def _next_begin(self, offset: int) -> int:
-        """Return where the next packet begins after an unreadable one at `offset`."""
-        known = [begin for begin in self._index if offset < begin < self._file_size]
+    def _next_begin(self) -> int:
+        """Return where the next packet begins after an unreadable one."""
+        known = [begin for begin in self._index if self._offset < begin < self._file_size]
         if known:
             return min(known)
-        found = self._find(offset + 1, self._file_size) if self._patterns else None
+        found = self._find(self._offset + 1, self._file_size) if self._patterns else None
         return self._file_size if found is None else found
 
     def _find(self, begin: int, end: int) -> int | None:
@@ -218,7 +211,7 @@ class _PacketFinder:
         entry = self._index.get(packet.offset)
         header = packet.header
         if self._index and entry is None and packet.offset < max(self._index):
-            self._say(packet.number, packet.offset, "the packet is not in the index")
+            self._say("the packet is not in the index")
         if entry is None:
             return
         for found, expected, what in (
@@ -229,9 +222,7 @@ class _PacketFinder:
         ):
             if found is not None and found != expected:
                 self._say(
-                    packet.number,
-                    packet.offset,
-                    f"the index says that the packet's {what} is {expected}, the packet {found}",
+                    f"the index says that the packet's {what} is {expected}, the packet {found}"
                 )
 
 
@@ -288,7 +279,7 @@ def streams_of(
     files: Sequence[Path],
     reader: HeaderReader,
     layouts: dict[int, StreamLayout],
-    report: Callable[[Path, int, int, str], None],
+    report: OnFileDamage,
 ) -> list[Stream]:
     """Return the streams of a trace, in order of class and instance.
 

@@ -5,35 +5,28 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
-from msgflow.trace.ctf import metadata
+from msgflow.trace.archive import Unpacked
+from msgflow.trace.ctf import json_metadata, tsdl
 from msgflow.trace.ctf.batches import Iteration
+from msgflow.trace.ctf.declarations import Clock, TraceClass
 from msgflow.trace.ctf.event_positions import BEYOND_END
 from msgflow.trace.ctf.field_types import MetadataError
-from msgflow.trace.ctf.losses import LossCounter
+from msgflow.trace.ctf.losses import Continuation, LossCounter
 from msgflow.trace.ctf.packet_header import HeaderReader
 from msgflow.trace.ctf.packet_index import orphans
-from msgflow.trace.ctf.packet_order import entries_of
+from msgflow.trace.ctf.packet_order import Entry, entries_of
 from msgflow.trace.ctf.packet_times import begins_of
-from msgflow.trace.ctf.packets import streams_of
+from msgflow.trace.ctf.packets import Packet, Stream, streams_of
 from msgflow.trace.ctf.stream_layout import StreamLayout
 from msgflow.trace.ctf.trace_info import corrected, describe
 from msgflow.trace.discovery import irregular_files, stream_files
-from msgflow.trace.metadata_frame import FILE_NAME
-from msgflow.trace.model import Damage, TraceInfo
+from msgflow.trace.metadata_frame import FILE_NAME, MetadataKind, text_of
+from msgflow.trace.model import Damage, TraceInfo, TraceLocation
 from msgflow.trace.regular_file import unreadable_error
 from msgflow.trace.time_base import on_one_base
-from msgflow.trace.trace_set import TraceSet
-
-if TYPE_CHECKING:
-    from msgflow.trace.archived_traces import Unpacked
-    from msgflow.trace.ctf.losses import Continuation
-    from msgflow.trace.ctf.packet_order import Entry
-    from msgflow.trace.ctf.packets import Packet, Stream
-    from msgflow.trace.model import TraceLocation
-    from msgflow.trace.trace_set import Batches, Report, Wanted
+from msgflow.trace.trace_set import Batches, Report, TraceSet, Wanted
 
 
 class CtfTraceSet(TraceSet):
@@ -42,8 +35,8 @@ class CtfTraceSet(TraceSet):
     def __init__(
         self,
         locations: Sequence[TraceLocation],
+        unpacked: Unpacked,
         *,
-        archives: Unpacked | None = None,
         strict: bool = False,
         after: Continuation | None = None,
     ) -> None:
@@ -52,7 +45,7 @@ class CtfTraceSet(TraceSet):
         `strict` ends at the first damage. `after` holds what was read before of the same
         recordings, and takes these parts in. They can be read only once then.
         """
-        super().__init__(archives)
+        super().__init__(unpacked)
         self._strict = strict
         self._layouts: list[StreamLayout] = []
         self._streams: list[Stream] = []
@@ -70,14 +63,15 @@ class CtfTraceSet(TraceSet):
     def _open(self, location: TraceLocation, index: int) -> TraceInfo:
         path = location.path
         try:
-            declared = metadata.read(path)
+            declared = read_metadata(path)
         except OSError as error:
             raise unreadable_error(error, path) from error
         if not location.size_bytes:
-            return TraceInfo(index, self.shown(path))
+            return TraceInfo(index, self.unpacked.shown(path))
         if all(stream_class.clock is None for stream_class in declared.streams.values()):
             for stream_class in declared.streams.values():
-                stream_class.give_order()
+                # Its packets are ordered by numbers in place of times.
+                stream_class.clock, stream_class.has_time = Clock(), False
         layouts = {}
         for stream_class in declared.streams.values():
             number = sum(len(layout.classes) for layout in self._layouts)
@@ -85,7 +79,7 @@ class CtfTraceSet(TraceSet):
             self._layouts.append(layout)
 
         def report(file: Path, position: int, offset: int, message: str) -> None:
-            self._report(Damage(index, self.shown(file), position, offset, message))
+            self._report(Damage(index, self.unpacked.shown(file), position, offset, message))
 
         for file in location.strays:
             report(file, 0, 0, "a stream without `metadata`, which is missing or renamed: left out")
@@ -98,13 +92,13 @@ class CtfTraceSet(TraceSet):
                 report(file, 0, 0, f"the stream {file.stem} is missing, only its index is there")
             streams = streams_of(stream_files(path), HeaderReader(declared), layouts, report)
         except MetadataError as error:
-            raise metadata.damaged_error(path, str(error)) from error
+            raise _damaged_error(path, str(error)) from error
         except OSError as error:
             raise unreadable_error(error, path) from error
         for stream in streams:
             stream.rank = len(self._streams)
             self._streams.append(stream)
-        return describe(declared, self.shown(path), index, streams)
+        return describe(declared, self.unpacked.shown(path), index, streams)
 
     def _batches(self, wanted: Wanted, progress: Report | None, batch_rows: int) -> Batches:
         self.damages = list(self._found_early)
@@ -133,15 +127,8 @@ class CtfTraceSet(TraceSet):
         packet = entry.packet
         if packet.is_cut and message == BEYOND_END:
             return  # reported when the packet was found
-        self._report(
-            Damage(
-                entry.stream.trace_index,
-                self.shown(packet.path),
-                packet.number,
-                packet.offset + offset,
-                message,
-            )
-        )
+        file, at = self.unpacked.shown(packet.path), packet.offset + offset
+        self._report(Damage(entry.stream.trace_index, file, packet.number, at, message))
 
     def _report(self, damage: Damage) -> None:
         if self._strict:
@@ -151,3 +138,22 @@ class CtfTraceSet(TraceSet):
                 hint="copy it again from where it was recorded, or read it without --strict",
             )
         self.damages.append(damage)
+
+
+def read_metadata(directory: Path) -> TraceClass:
+    """Read what the trace in this directory declares."""
+    kind, content = text_of(directory)
+    text = content.decode("utf-8", "replace")
+    try:
+        return json_metadata.parse(text) if kind is MetadataKind.JSON else tsdl.parse(text)
+    except (MetadataError, RecursionError) as error:
+        reason = str(error) if isinstance(error, MetadataError) else "too deeply nested"
+        raise _damaged_error(directory, reason) from error
+
+
+def _damaged_error(directory: Path, reason: str) -> TraceError:
+    """Return the error for metadata that makes no sense."""
+    return TraceError(
+        f"the trace's `metadata` is damaged or incomplete: {reason} — {directory}",
+        hint="copy it again from where it was recorded",
+    )

@@ -4,31 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
 from msgflow.trace.columns import COMMON_SCHEMA, first_inner_value, paths_of, to_array
-from msgflow.trace.ctf.arrow import (
-    declared_schema,
-    list_array,
-    number_array,
-    scattered_array,
-    text_array,
-)
+from msgflow.trace.ctf import arrow
 from msgflow.trace.ctf.event_body import Kind
+from msgflow.trace.ctf.event_order import Batch
 from msgflow.trace.ctf.field_columns import FieldRows
+from msgflow.trace.ctf.field_reader import EventReader
 from msgflow.trace.ctf.field_types import Scope, Structure
-from msgflow.trace.numpy_arrow import texts_to_arrow, to_arrow, to_numpy
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.event_order import Batch
-    from msgflow.trace.ctf.field_reader import EventReader
-    from msgflow.trace.ctf.packet_memory import Memory
-    from msgflow.trace.ctf.stream_layout import ClassLayout, StreamLayout
+from msgflow.trace.ctf.packet_memory import Memory
+from msgflow.trace.ctf.stream_layout import ClassLayout, StreamLayout
+from msgflow.trace.numpy_arrow import Integers, Values, texts_to_arrow, to_arrow, to_numpy
 
 _LEADING = 4
 """So many columns are not read from fields: id, time, trace and CPU."""
@@ -81,7 +71,7 @@ def make_plan(stream: StreamLayout, layout: ClassLayout, wanted: pa.Schema) -> C
 def build_batch(
     plan: ClassPlan,
     batch: Batch,
-    rows: NDArray[np.int64],
+    rows: Integers,
     first_id: int,
     reader_at: Callable[[int, int], tuple[EventReader, int]],
 ) -> pa.RecordBatch:
@@ -116,7 +106,7 @@ def build_batch(
 
 
 def _gathered(
-    plan: ClassPlan, memory: Memory, bodies: NDArray[np.int64]
+    plan: ClassPlan, memory: Memory, bodies: Integers
 ) -> Callable[[Source, pa.DataType], pa.Array]:
     """Return what gathers a column from memory, for all events at once."""
     fields = plan.layout.body.fields or ()
@@ -129,21 +119,21 @@ def _gathered(
         if number is None:
             found = map(rows.in_variant, source.paths)
             present = [values for values in found if values is not None]
-            return scattered_array(present, bodies.size, data_type)
+            return arrow.scattered_array(present, bodies.size, data_type)
         field = fields[number]
         if pa.types.is_dictionary(data_type) and field.kind is Kind.TEXT and field.count:
             return _short_names(rows.words(number, f"V{field.count}"))
         if field.kind is Kind.NUMBER:
-            return number_array(rows.numbers(number), data_type)
+            return arrow.number_array(rows.numbers(number), data_type)
         if pa.types.is_list(data_type):
-            return list_array(*rows.elements(number), data_type)
-        texts = text_array(*rows.text(number))
+            return arrow.list_array(*rows.elements(number), data_type)
+        texts = arrow.text_array(*rows.text(number))
         return texts.dictionary_encode() if pa.types.is_dictionary(data_type) else texts
 
     return array
 
 
-def _short_names(content: NDArray[Any]) -> pa.Array:
+def _short_names(content: Values) -> pa.Array:
     """Return names that end at their first NUL; few of them differ.
 
     `content` has the bytes of each name as one item of numpy's type `V`.
@@ -179,11 +169,11 @@ def _sources(
     layout: ClassLayout, scope: Scope, structure: Structure, columns: Iterable[pa.Field]
 ) -> list[Source | None]:
     numbers: dict[tuple[str, ...], int] = {
-        (field.name,): number
+        field.path: number
         for number, field in enumerate(layout.body.fields or ())
         if field.scope is scope
     }
     return [
         Source(scope, paths, numbers.get(paths[0])) if paths else None
-        for paths in paths_of(columns, declared_schema(structure))
+        for paths in paths_of(columns, arrow.declared_schema(structure))
     ]

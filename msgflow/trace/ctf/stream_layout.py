@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from msgflow.trace.ctf.declarations import Clock, EventClass, StreamClass, TraceClass
 from msgflow.trace.ctf.event_body import EventBody, compile_body
 from msgflow.trace.ctf.event_header import EventHeader, Form, compile_header
 from msgflow.trace.ctf.field_reader import EventReader
 from msgflow.trace.ctf.field_types import BYTE, FieldError, Type, aligned, parts
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace.ctf.clock import Clock
-    from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
+from msgflow.trace.numpy_arrow import Integers
 
 GAP = 64
 """Bytes of ones that follow a packet in memory; packets begin at multiples of it."""
@@ -54,13 +49,10 @@ class StreamLayout:
         self.trace_index = trace_index
         self.trace = trace
         self.stream = stream
-        align = max(
-            largest_align(stream.event_header),
-            largest_align(stream.event_context),
-            *(largest_align(event.specific_context) for event in stream.events.values()),
-            *(largest_align(event.payload) for event in stream.events.values()),
-            BYTE,
-        )
+        structures = [stream.event_header, stream.event_context]
+        for event in stream.events.values():
+            structures += [event.specific_context, event.payload]
+        align = max(BYTE, *map(largest_align, structures))
         # Events whose positions differ by a multiple of this have the same layout.
         self.residues = min(align // BYTE, _MOST_RESIDUES)
         # How to read many event headers at once; None: they are read field by field.
@@ -70,7 +62,8 @@ class StreamLayout:
         self._short_forms: dict[int, tuple[EventBody, int]] = {}
         if align // BYTE <= _MOST_RESIDUES:
             self.header = compile_header(stream, self.residues)
-        if self.header is not None and self.header.largest_size > GAP:
+        forms = () if self.header is None else self.header.forms
+        if any(max(form.sizes) > GAP for form in forms):
             # Reading it all at once might go beyond the end of the memory.
             self.header = None
         # Event class id to layout.
@@ -126,7 +119,7 @@ class StreamLayout:
         return sizes
 
     @cached_property
-    def size_table(self) -> NDArray[np.int64] | None:
+    def size_table(self) -> Integers | None:
         """`sizes_by_selector` as an array by selector and residue, 0 where they have none.
 
         The last row has none: larger selectors are looked up there. None if there are too many

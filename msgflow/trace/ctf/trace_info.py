@@ -5,18 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
+from msgflow.trace.ctf.declarations import Clock, TraceClass
+from msgflow.trace.ctf.field_types import Structure
 from msgflow.trace.ctf.packet_times import end_of
+from msgflow.trace.ctf.packets import Stream
 from msgflow.trace.model import TraceInfo
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.clock import Clock
-    from msgflow.trace.ctf.declarations import TraceClass
-    from msgflow.trace.ctf.field_types import Structure
-    from msgflow.trace.ctf.packets import Stream
-
 
 _PROCESS_CONTEXT = {"vpid", "vtid"}
 
@@ -91,18 +86,18 @@ def description(
     `begins` and `ends` are those of its streams, in ns since the epoch by the declared clock. An
     event has a name and the names of its contexts.
     """
+    said = {name: str(value) for name, value in environment.items()}
     return TraceInfo(
         index=index,
         path=path,
         uuid=uuid,
-        domain=_text(environment, "domain"),
-        hostname=_text(environment, "hostname"),
-        tracer=_tracer(environment),
+        domain=said.get("domain"),
+        hostname=said.get("hostname"),
+        tracer=_tracer(said),
         clock_uuid=clock.uuid,
         clock_name=clock.name,
         clock_offset_ns=clock.to_ns(0),
         clock_frequency=clock.frequency,
-        clock_correction_ns=0,
         begin_ns=min(begins, default=None),
         end_ns=max(ends, default=None),
         has_process_context=all(contexts >= _PROCESS_CONTEXT for _, contexts in events),
@@ -111,14 +106,9 @@ def description(
     )
 
 
-def _text(environment: Mapping[str, int | str], name: str) -> str | None:
-    return str(environment[name]) if name in environment else None
-
-
-def _tracer(environment: Mapping[str, int | str]) -> str | None:
-    name = _text(environment, "tracer_name")
-    if name is None:
+def _tracer(environment: Mapping[str, str]) -> str | None:
+    if "tracer_name" not in environment:
         return None
     parts = ("tracer_major", "tracer_minor", "tracer_patchlevel", "tracer_patch")
-    version = ".".join(str(environment[part]) for part in parts if part in environment)
-    return f"{name} {version}".rstrip()
+    version = ".".join(environment[part] for part in parts if part in environment)
+    return f"{environment['tracer_name']} {version}".rstrip()

@@ -7,16 +7,8 @@ from dataclasses import dataclass, field, replace
 from uuid import UUID
 
 from msgflow.trace.ctf import field_types as ctf
-from msgflow.trace.ctf.clock import Clock
-from msgflow.trace.ctf.declarations import EventClass, StreamClass, TraceClass
-from msgflow.trace.ctf.field_types import (
-    MetadataError,
-    Reference,
-    Role,
-    Scope,
-    integer_of,
-    may_have,
-)
+from msgflow.trace.ctf.declarations import Clock, EventClass, StreamClass, TraceClass
+from msgflow.trace.ctf.field_types import MetadataError, Role, Scope, integer_of, may_have
 from msgflow.trace.ctf.tsdl_tokens import Token, tokens_of
 from msgflow.trace.ctf.tsdl_types import TypeParser, Value, without_prefix
 
@@ -45,12 +37,13 @@ _SCOPES = {
     "context": Scope.SPECIFIC_CONTEXT,
     "fields": Scope.PAYLOAD,
 }
+_KINDS = ("trace", "env", "clock", "stream", "event", "callsite")
 Frames = list[dict[str, ctf.Type]]
 
 
 @dataclass
 class _Block:
-    """A `trace`, `stream`, `event`, `clock` or `env` block."""
+    """A block of one of `_KINDS`."""
 
     values: dict[str, Value] = field(default_factory=dict)
     structures: dict[Scope, ctf.Structure] = field(default_factory=dict)
@@ -63,7 +56,7 @@ def parse(text: str) -> TraceClass:
         blocks.parse()
     except MetadataError as error:
         raise MetadataError(f"line {blocks.token.line}: {error}") from error
-    return _trace_class(blocks)
+    return _trace_class(blocks.of_kind)
 
 
 class _Blocks(TypeParser):
@@ -71,11 +64,7 @@ class _Blocks(TypeParser):
 
     def __init__(self, tokens: list[Token]) -> None:
         super().__init__(tokens, _is_big_endian(tokens))
-        self.trace: _Block | None = None
-        self.environment: dict[str, Value] = {}
-        self.clocks: list[_Block] = []
-        self.streams: list[_Block] = []
-        self.events: list[_Block] = []
+        self.of_kind: dict[str, list[_Block]] = {kind: [] for kind in _KINDS}
 
     def parse(self) -> None:
         while self.token.kind != "end":
@@ -85,18 +74,9 @@ class _Blocks(TypeParser):
             kind = self.name()
             block = self._block()
             self.expect(";")
-            if kind == "trace":
-                self.trace = block
-            elif kind == "env":
-                self.environment.update(block.values)
-            elif kind == "clock":
-                self.clocks.append(block)
-            elif kind == "stream":
-                self.streams.append(block)
-            elif kind == "event":
-                self.events.append(block)
-            elif kind != "callsite":
+            if kind not in self.of_kind:
                 raise MetadataError(f"there is no block {kind!r}")
+            self.of_kind[kind].append(block)
 
     def _block(self) -> _Block:
         block = _Block()
@@ -132,23 +112,22 @@ def _is_big_endian(tokens: list[Token]) -> bool:
     raise MetadataError("the trace's byte order is not declared")
 
 
-def _trace_class(blocks: _Blocks) -> TraceClass:
-    if blocks.trace is None:
+def _trace_class(blocks: Mapping[str, list[_Block]]) -> TraceClass:
+    if not blocks["trace"]:
         raise MetadataError("there is no `trace` block")
-    outer = {Scope.PACKET_HEADER: ctf.Structure()}
-    _add(outer, blocks.trace, Scope.PACKET_HEADER)
-    trace = TraceClass(
-        uuid=_uuid(blocks.trace),
-        environment=dict(blocks.environment),
-        packet_header=outer[Scope.PACKET_HEADER],
-    )
+    declared = blocks["trace"][-1]
+    outer: dict[Scope, ctf.Structure] = {}
+    _add(outer, declared, Scope.PACKET_HEADER)
+    trace = TraceClass(_uuid(declared), packet_header=outer[Scope.PACKET_HEADER])
+    for block in blocks["env"]:
+        trace.environment |= block.values
     clocks = {
-        str(block.values.get("name", "")): _clock(block, trace.notes) for block in blocks.clocks
+        str(each.values.get("name", "")): _clock(each, trace.notes) for each in blocks["clock"]
     }
     only_clock = next(iter(clocks.values())) if len(clocks) == 1 else None
     scopes: dict[int, dict[Scope, ctf.Structure]] = {}
     # A trace may have a single stream that is not worth a block.
-    for block in blocks.streams or [_Block()]:
+    for block in blocks["stream"] or [_Block()]:
         stream_scopes = dict(outer)
         for scope in (Scope.PACKET_CONTEXT, Scope.EVENT_HEADER, Scope.EVENT_CONTEXT):
             _add(stream_scopes, block, scope)
@@ -163,7 +142,7 @@ def _trace_class(blocks: _Blocks) -> TraceClass:
             raise MetadataError(f"there are two streams {stream.id}")
         trace.streams[stream.id] = stream
         scopes[stream.id] = stream_scopes
-    for block in blocks.events:
+    for block in blocks["event"]:
         stream_id = integer_of(block.values, "stream_id", next(iter(trace.streams)))
         if stream_id not in trace.streams:
             raise MetadataError(f"there is no stream {stream_id}")
@@ -279,7 +258,7 @@ class _Resolver:
             choices.append(ctf.Choice(name, self._type(choice.type, frames), ranges))
         return replace(declared, choices=tuple(choices))
 
-    def _find(self, reference: Reference, frames: Frames) -> ctf.Type | None:
+    def _find(self, reference: ctf.Reference, frames: Frames) -> ctf.Type | None:
         if reference.scope is not None:
             return _follow(self._scopes.get(reference.scope), reference.path)
         for frame in reversed(frames):

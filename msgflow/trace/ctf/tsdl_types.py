@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from msgflow.trace.ctf import field_types as ctf
 from msgflow.trace.ctf.field_types import BYTE, MetadataError, Reference, Scope, integer_of
-from msgflow.trace.ctf.tsdl_tokens import TokenStream
-
-if TYPE_CHECKING:
-    from msgflow.trace.ctf.tsdl_tokens import Token
+from msgflow.trace.ctf.tsdl_tokens import Token, TokenStream
 
 Labels = dict[str, tuple[tuple[int, int], ...]]
 Value = int | str
 
+_DECLARATIONS = {"typealias", "typedef", "struct", "variant", "enum"}
 _BASES = dict.fromkeys(("16", "x", "hex", "hexadecimal", "p"), 16)
 _TEXT_ENCODINGS = {"utf8", "utf-8", "ascii"}
 _ABSOLUTE = (
@@ -49,14 +46,7 @@ class TypeParser(TokenStream):
 
     def at_declaration(self) -> bool:
         """Tell whether a `typealias`, `typedef` or named compound type follows."""
-        token = self.token
-        return token.kind == "name" and token.value in {
-            "typealias",
-            "typedef",
-            "struct",
-            "variant",
-            "enum",
-        }
+        return self.token.kind == "name" and self.token.value in _DECLARATIONS
 
     def declaration(self) -> None:
         """Parse a declaration that gives a type a name."""

@@ -17,9 +17,10 @@ from thorough import few
 import msgflow.trace
 from msgflow.errors import TraceError
 from msgflow.trace import PACKET
-from msgflow.trace.ctf import json_metadata, metadata, tsdl
-from msgflow.trace.ctf.clock import LATEST_NS, Clock
+from msgflow.trace.ctf import json_metadata, tsdl
+from msgflow.trace.ctf.declarations import LATEST_NS, Clock
 from msgflow.trace.ctf.field_types import MetadataError
+from msgflow.trace.ctf.reader import read_metadata
 
 EVENTS, PACKETS, HEADER, EVENT = 50, 10, 84, 10 + 25 + 8
 BEGIN = "trace { major = 1; minor = 8; byte_order = le; };"
@@ -216,7 +217,7 @@ class TestMetadata:
         text = f"{BEGIN} event {{ fields := struct {{ string a[{digits}]; }}; }};"
         (tmp_path / "metadata").write_text("/* CTF 1.8 */" + text)
         with pytest.raises(TraceError, match="makes no sense"):
-            metadata.read(tmp_path)
+            read_metadata(tmp_path)
 
     def test_long_numbers_in_json(self) -> None:
         numbers = f'{{"a": {"9" * 5000}, "b": -{"9" * 5000}}}'
@@ -300,17 +301,17 @@ class TestShapes:
         text += '\x1e{"type": "data-stream-class", "packet-context-field-class": "t39"}'
         (tmp_path / "metadata").write_text(text)
         with pytest.raises(TraceError, match="more than 100000 fields"):
-            metadata.read(tmp_path)
+            read_metadata(tmp_path)
 
     def test_depth(self, tmp_path: Path) -> None:
         for depth, is_read in ((30, True), (31, False)):
             text = f"{BEGIN} event {{ fields := struct {{ string a{'[1]' * depth}; }}; }};"
             (tmp_path / "metadata").write_text("/* CTF 1.8 */" + text)
             if is_read:
-                metadata.read(tmp_path)
+                read_metadata(tmp_path)
             else:
                 with pytest.raises(TraceError, match="too deeply nested"):
-                    metadata.read(tmp_path)
+                    read_metadata(tmp_path)
 
 
 class TestFiles:

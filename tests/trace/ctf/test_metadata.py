@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from msgflow.errors import TraceError
-from msgflow.trace.ctf import json_metadata, metadata, tsdl
+from msgflow.trace.ctf import json_metadata, tsdl
 from msgflow.trace.ctf.declarations import TraceClass
 from msgflow.trace.ctf.field_types import (
     Array,
@@ -26,6 +26,7 @@ from msgflow.trace.ctf.field_types import (
     VariableInteger,
     Variant,
 )
+from msgflow.trace.ctf.reader import read_metadata
 
 BEGIN = "trace { major = 1; minor = 8; byte_order = le; };"
 
@@ -188,7 +189,7 @@ class TestBlocks:
 def test_what_is_wrong_is_said(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "metadata").write_text("/* CTF 1.8 */" + text)
     with pytest.raises(TraceError, match=message) as caught:
-        metadata.read(tmp_path)
+        read_metadata(tmp_path)
     assert str(tmp_path) in caught.value.message
 
 
@@ -220,7 +221,7 @@ def test_packets_in_both_byte_orders(tmp_path: Path, order: str) -> None:
         head = struct.pack(f"{order}I16sIII5B", 0x75D11D57, b"", 0, bits, 4096 * 8, *range(5))
         content += (head + part).ljust(4096, b"\0")
     (tmp_path / "metadata").write_bytes(content)
-    assert metadata.read(tmp_path).environment == {"hostname": "robot"}
+    assert read_metadata(tmp_path).environment == {"hostname": "robot"}
 
 
 def test_json_in_packets_whose_header_says_one_point_eight(tmp_path: Path) -> None:
@@ -228,7 +229,7 @@ def test_json_in_packets_whose_header_says_one_point_eight(tmp_path: Path) -> No
     bits = (37 + len(text)) * 8
     head = struct.pack("<I16sIII5B", 0x75D11D57, b"", 0, bits, bits, 0, 0, 0, 1, 8)
     (tmp_path / "metadata").write_bytes(head + text)
-    assert isinstance(metadata.read(tmp_path), TraceClass)
+    assert isinstance(read_metadata(tmp_path), TraceClass)
 
 
 def test_json_before_the_final_specification() -> None:
