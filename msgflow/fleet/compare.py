@@ -7,19 +7,17 @@ import shlex
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pyarrow as pa
 
 from msgflow.errors import UsageError
+from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_connection import Reading, choose
 from msgflow.query.compare import runs_compared, share_of
 from msgflow.query.differences import STATISTICS, Differences
 from msgflow.query.selection import CASES, CUT_COLUMN
 from msgflow.text.name_suggestions import meant_or, nearest
-
-if TYPE_CHECKING:
-    from msgflow.fleet.lake import Lake
 
 Row = dict[str, Any]
 

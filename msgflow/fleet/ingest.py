@@ -11,18 +11,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgflow.errors import MsgflowError, TraceError, UsageError
 from msgflow.fleet.file_store import S3, normal_url
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.sources import Recording, find_recordings, look_at
+from msgflow.fleet.sources import Recording, State, find_recordings, look_at
 from msgflow.fleet.task import PASSING, Options, Outcome, Reason, Task, needs, without_secrets
-from msgflow.fleet.workers import make_workers
-
-if TYPE_CHECKING:
-    from msgflow.fleet.sources import State
-    from msgflow.fleet.workers import Workers
+from msgflow.fleet.workers import Workers, make_workers
 
 _LOOKING_AT_ONCE = 8
 _SECONDS_BETWEEN_LOOKS = 0.5

@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import duckdb
 import pyarrow as pa
@@ -25,6 +25,7 @@ import pyarrow.parquet as pq
 from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.sql_guard import require_condition
 from msgflow.errors import DatabaseError, UsageError
+from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import RUN, VIEWS, part_path, view_path
 from msgflow.fleet.part import ANSWERS, KEY, PART, public_views, view_rows, write_rows
 from msgflow.fleet.run_database import run_database
@@ -32,9 +33,6 @@ from msgflow.sql.failure import first_line
 from msgflow.sql.quoting import identifier, literal
 from msgflow.text.name_suggestions import meant_or, nearest
 from msgflow.version import __version__
-
-if TYPE_CHECKING:
-    from msgflow.fleet.lake import Lake
 
 _COLUMN = re.compile(r'Referenced column "((?:[^"]|"")*)"')
 # DuckDB says this when pyarrow failed to read a bucket.

@@ -4,23 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
-from msgflow.fleet.lake import list_failures
+from msgflow.fleet.lake import Lake, list_failures
 from msgflow.fleet.lake_connection import Reading, choose, lake_errors
 from msgflow.fleet.lake_query import STATEMENTS, fleet_query, header_of
 from msgflow.result.query_result import QueryResult
 from msgflow.text.shell import shell_quoted
 from msgflow.view.assets import single_page
 from msgflow.view.table_encoding import encode
-
-if TYPE_CHECKING:
-    from msgflow.fleet.lake import Lake
 
 # Most labels with a table on the page; each takes a query over all flows.
 MOST_LABELS = 8

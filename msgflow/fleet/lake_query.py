@@ -13,14 +13,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import duckdb
 import pyarrow as pa
 
 from msgflow.database import guarded_rows, sql_error
 from msgflow.errors import DatabaseError, QueryError, UsageError
-from msgflow.fleet.lake_connection import Reading, choose, lake_errors, what_there_is
+from msgflow.fleet.lake import Lake
+from msgflow.fleet.lake_connection import Choice, Reading, choose, lake_errors, what_there_is
 from msgflow.fleet.layout import VIEWS
 from msgflow.fleet.part import ANSWERS
 from msgflow.query.catalogue import choose_query, load_query, queries_meant
@@ -28,17 +29,12 @@ from msgflow.query.runner import bind, shown_rows
 from msgflow.query.selection import make_selection, selected, values_of
 from msgflow.result.query_result import QueryResult
 from msgflow.sql.failure import first_line
-from msgflow.sql.header import Column, relations_of
+from msgflow.sql.header import Column, Header, relations_of
 from msgflow.sql.interrupt import interruptible
 from msgflow.sql.quoting import identifier
 from msgflow.sql.statement import Statements
+from msgflow.sql.value import Value
 from msgflow.text.name_suggestions import did_you_mean
-
-if TYPE_CHECKING:
-    from msgflow.fleet.lake import Lake
-    from msgflow.fleet.lake_connection import Choice
-    from msgflow.sql.header import Header
-    from msgflow.sql.value import Value
 
 GROUP = "label_group"
 WORST = "worst"

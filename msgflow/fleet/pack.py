@@ -11,21 +11,19 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from msgflow.errors import DatabaseError
 from msgflow.fleet import layout
+from msgflow.fleet.file_store import Entry
+from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import read_parquet
 from msgflow.fleet.part import ANSWERS
 from msgflow.sql.failure import first_line
 from msgflow.version import __version__
-
-if TYPE_CHECKING:
-    from msgflow.fleet.file_store import Entry
-    from msgflow.fleet.lake import Lake
 
 # Size of one pack: each of its tables is held in memory, and it is written again when one of its
 # runs is removed.

@@ -9,25 +9,22 @@ from __future__ import annotations
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import duckdb
 import pyarrow as pa
 import pyarrow.parquet
 
 from msgflow.db.connection import recorded_revision
 from msgflow.db.objects import public_names
 from msgflow.errors import TraceError
+from msgflow.fleet.file_store import Store
 from msgflow.fleet.layout import RUN, database_path, metadata, new_part, part_path, view_path
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.fleet.file_store import Store
 
 KEY, PART = "run", "part"
 _ROWS_AT_ONCE = 100_000

@@ -10,21 +10,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import duckdb
 import pyarrow as pa
 
 from msgflow.db.connection import connect
 from msgflow.db.migration import upgrade
 from msgflow.errors import DatabaseError, MsgflowError, UsageError
+from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import database_path
 from msgflow.fleet.part import run_key
 from msgflow.trace.extraction import LIMIT_VARIABLE, limit_of
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.fleet.lake import Lake
 
 _CHUNK = 8 * 1024 * 1024
 _SHORTEST = 4

@@ -9,14 +9,10 @@ they are reported; that they have the time of initialisation shows it.
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING
 
-from msgflow.ingest.catalogue import load
+import duckdb
 
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.ingest.catalogue import Tracepoint
+from msgflow.ingest.catalogue import Tracepoint, load
 
 _AGAIN = "ros2_caret:"
 _FIRST = "ros2:"

@@ -9,18 +9,15 @@ of `raw.interrupt`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
+from msgflow.ingest.catalogue import Catalogue, CpuRole, Tracepoint
 from msgflow.ingest.groups import NONE, Groups, Latest, Numbers, gathered
 from msgflow.trace.numpy_arrow import texts_to_arrow, to_arrow, to_numpy
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.ingest.catalogue import Catalogue, CpuRole, Tracepoint
 
 # Table of `raw`: interrupts that were handled while a thread had the CPU.
 INTERRUPT = "interrupt"

@@ -5,12 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError, UsageError
-
-if TYPE_CHECKING:
-    from msgflow.trace import TraceInfo
+from msgflow.trace import TraceInfo
 
 
 def hostnames_of(

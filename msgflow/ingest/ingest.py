@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import duckdb
 
@@ -18,7 +17,7 @@ from msgflow.clocks.correction import set_clocks
 from msgflow.db import migration
 from msgflow.db.connection import attach
 from msgflow.db.derivation import derive
-from msgflow.db.finding import read_findings
+from msgflow.db.finding import Finding, read_findings
 from msgflow.db.memory import default_limit, ingest_memory_errors, limit_threads, set_memory_limit
 from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.transaction import transaction
@@ -30,16 +29,11 @@ from msgflow.ingest.load import load_traces
 from msgflow.ingest.samples import load_samples
 from msgflow.ingest.stored_run import fallback_name, require_free_name, store_run
 from msgflow.links.annotations import declare_links
-from msgflow.links.links_file import read_links
+from msgflow.links.links_file import LinksFile, read_links
 from msgflow.run.choice import require_run_name
 from msgflow.sql.failure import database_errors, in_words
-from msgflow.sql.interrupt import interruptible, noted_interrupts
-
-if TYPE_CHECKING:
-    from msgflow.db.finding import Finding
-    from msgflow.links.links_file import LinksFile
-    from msgflow.sql.interrupt import Interrupts
-    from msgflow.trace import Progress, TraceSet
+from msgflow.sql.interrupt import Interrupts, interruptible, noted_interrupts
+from msgflow.trace import Progress, TraceSet
 
 
 @dataclass(frozen=True)

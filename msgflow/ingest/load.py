@@ -7,28 +7,23 @@ import itertools
 import time
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
+import duckdb
 import pyarrow as pa
 
 from msgflow.db.store import empty
 from msgflow.db.transaction import transaction
 from msgflow.ingest import overlapping_traces
-from msgflow.ingest.catalogue import USER_EVENT, load
+from msgflow.ingest.catalogue import USER_EVENT, Tracepoint, load
 from msgflow.ingest.cpus import Cpus
+from msgflow.ingest.overlapping_traces import Corrections
 from msgflow.ingest.sequences import Sequences
 from msgflow.ingest.staging import RawTables
 from msgflow.ingest.user_events import is_match, matches, names_of, user_rows
+from msgflow.sql.interrupt import Interrupts
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
 from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_numpy, without
 from msgflow.trace.prefetch import prefetched
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.ingest.catalogue import Tracepoint
-    from msgflow.ingest.overlapping_traces import Corrections
-    from msgflow.sql.interrupt import Interrupts
 
 _TIMES = {"timestamp", "source_timestamp", "message_timestamp", "init_timestamp", "period"}
 # 146 years in nanoseconds: differences of any two times fit, as they do in the reader.

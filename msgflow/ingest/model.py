@@ -11,7 +11,8 @@ import functools
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+
+import duckdb
 
 from msgflow.db import objects
 from msgflow.db.finding import kinds_with_rows, statement
@@ -20,13 +21,8 @@ from msgflow.files.resources import resource_directory
 from msgflow.ingest import staging
 from msgflow.ingest.caret_initialisation import restore
 from msgflow.ingest.catalogue import load
+from msgflow.sql.header import Header
 from msgflow.sql.statement import with_rows
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.sql.header import Header
-
 
 _FINDING = "staging.finding"
 _TABLE = re.compile(r"CREATE TABLE ([a-z_.]+) \([^;]*;")

@@ -12,19 +12,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
 
+import duckdb
 import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
 
 from msgflow.files.resources import resource_directory
 from msgflow.ingest.catalogue import USER_EVENT, load
 from msgflow.sql.statement import Statements
 from msgflow.trace.numpy_arrow import is_valid, to_arrow, to_numpy
-
-if TYPE_CHECKING:
-    import duckdb
-    import pyarrow as pa
-    from numpy.typing import NDArray
 
 # By how much the two records of one event may be apart [ns], at the ends of a recording.
 _SLACK_NS = 100_000

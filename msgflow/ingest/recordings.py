@@ -15,14 +15,10 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow import trace as trace_package
 from msgflow.ingest.hostnames import hostnames_of
-from msgflow.trace import archive
-
-if TYPE_CHECKING:
-    from msgflow.trace import TraceInfo
+from msgflow.trace import TraceInfo, archive
 
 # What LTTng makes below the folder of a session: buffers by user or by process, and chunks.
 _OF_LTTNG = re.compile(

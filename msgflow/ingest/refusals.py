@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.ingest.catalogue import load
-
-if TYPE_CHECKING:
-    from msgflow.trace import Damage, TraceInfo
+from msgflow.trace import Damage, TraceInfo
 
 _SHOWN = 5
 

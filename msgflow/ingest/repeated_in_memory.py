@@ -5,28 +5,25 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import duckdb
+
+from msgflow.clocks.clocks_file import ClockSync
 from msgflow.clocks.correction import set_clocks
 from msgflow.db import empty_database
 from msgflow.db.derivation import derive
 from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.store import empty
 from msgflow.db.transaction import transaction
+from msgflow.errors import UsageError
 from msgflow.ingest import model, staging
 from msgflow.ingest.load import load_traces
 from msgflow.ingest.stored_run import store_run
 from msgflow.links.annotations import declare_links
+from msgflow.links.links_file import DeclaredLink, LinksFile
 from msgflow.sql.interrupt import noted_interrupts
 from msgflow.sql.quoting import literal
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.clocks.clocks_file import ClockSync
-    from msgflow.errors import UsageError
-    from msgflow.links.links_file import DeclaredLink, LinksFile
-    from msgflow.trace import TraceSet
+from msgflow.trace import TraceSet
 
 
 def database_in_memory() -> duckdb.DuckDBPyConnection:

@@ -5,19 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import duckdb
 import pyarrow as pa
 
 from msgflow.db.transaction import transaction
 from msgflow.errors import TraceError
+from msgflow.sql.interrupt import Interrupts
+from msgflow.trace import TraceSet
 from msgflow.trace.perf_script import DATA, TEXT, read_script, sample_files, write_script
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.sql.interrupt import Interrupts
-    from msgflow.trace import TraceSet
 
 
 def load_samples(

@@ -8,21 +8,18 @@ looking for predecessors later would sort the largest tables there are.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
+from msgflow.ingest.catalogue import Catalogue, Tracepoint
 from msgflow.ingest.groups import NONE, Groups, Latest, Numbers, gathered, present
 from msgflow.trace.columns import COMMON_SCHEMA
 from msgflow.trace.numpy_arrow import is_valid, texts_to_arrow, to_arrow, to_numpy
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.ingest.catalogue import Catalogue, Tracepoint
-
-    Rows = tuple[str, pa.RecordBatch]  # of a table of `raw`
+Rows = tuple[str, pa.RecordBatch]  # of a table of `raw`
 
 _LEADING = ("event_id", "ts_ns", "trace_index", "cpu_id")
 _CONTEXTS = len(COMMON_SCHEMA)

@@ -12,7 +12,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import duckdb
+import pyarrow as pa
 
 from msgflow.db.transaction import transaction
 from msgflow.errors import UsageError
@@ -22,10 +24,6 @@ from msgflow.ingest.catalogue import COMMON_COLUMNS, Tracepoint, load
 from msgflow.sql.quoting import literal
 from msgflow.sql.statement import internal_sql, registered
 from msgflow.trace import PACKET
-
-if TYPE_CHECKING:
-    import duckdb
-    import pyarrow as pa
 
 # Rows that wait for a commit take memory that nothing limits.
 _ROWS_PER_TRANSACTION = 2_000_000

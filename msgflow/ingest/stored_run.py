@@ -6,7 +6,8 @@ import itertools
 import os
 from collections.abc import Sequence, Set
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import duckdb
 
 from msgflow.db.derivation import derivation_hash
 from msgflow.db.store import delete, store
@@ -15,9 +16,6 @@ from msgflow.ingest.recordings import session_folder
 from msgflow.run.choice import is_run_name
 from msgflow.trace import archive
 from msgflow.version import __version__
-
-if TYPE_CHECKING:
-    import duckdb
 
 
 def store_run(

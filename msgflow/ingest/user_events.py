@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
 
+import duckdb
 import pyarrow as pa
 
 from msgflow.ingest.catalogue import load
 from msgflow.sql.json_fields import column_name, json_fields
 from msgflow.sql.statement import registered
+from msgflow.trace import TraceInfo
 from msgflow.trace.columns import COMMON_SCHEMA
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.trace import TraceInfo
 
 _SCHEMA = pa.schema([*COMMON_SCHEMA, ("name", pa.string()), ("fields", pa.string())])
 

@@ -8,12 +8,10 @@ request has arrived, and when it is answered.
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
+from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
-
-if TYPE_CHECKING:
-    from starlette.types import ASGIApp, Receive, Scope, Send
 
 # A browser that opens a connection ahead of its need opens another one later.
 SECONDS_FOR_A_REQUEST = 10.0

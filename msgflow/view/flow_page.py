@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import duckdb
 import pyarrow as pa
 from pyarrow import compute
 
 from msgflow.files.atomic import replacing
 from msgflow.query.flow import STEPS_PER_MESSAGE
+from msgflow.run.choice import Run
 from msgflow.run.window import Window
 from msgflow.view.assets import single_page
 from msgflow.view.page_query import Params, Question, run_page_query
 from msgflow.view.pages import Pages, critical_path
 from msgflow.view.table_encoding import encode
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.run.choice import Run
 
 _BAR = ["row_key", "kind", "id", "start_at", "length", "flags"]
 # Vertices of the whole flow, without limits.

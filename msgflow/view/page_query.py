@@ -13,23 +13,19 @@ from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import duckdb
+import pyarrow as pa
 
 from msgflow.errors import UsageError
 from msgflow.query.flow import KINDS
+from msgflow.run.choice import Run
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
+from msgflow.sql.header import Param
 from msgflow.sql.statement import Statements
-
-if TYPE_CHECKING:
-    import pyarrow as pa
-
-    from msgflow.run.choice import Run
-    from msgflow.sql.header import Param
-    from msgflow.sql.value import Value
-
+from msgflow.sql.value import Value
 
 Params = dict[str, Any]
 

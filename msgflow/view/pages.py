@@ -7,8 +7,9 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import duckdb
 import pyarrow as pa
 
 from msgflow.db.finding import read_findings
@@ -17,20 +18,16 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.compare import compare, warm_up
 from msgflow.query.notes import clock_notes
 from msgflow.query.runner import Steps, bind, run_query
+from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.sql.statement import internal_sql
+from msgflow.sql.value import Value
 from msgflow.text.shell import shell_joined
 from msgflow.view import summary
 from msgflow.view.page_query import Params, Question, Scratch, page_query, run_page_query
 from msgflow.view.sql_page import examples, words
 from msgflow.view.table_encoding import encode, encode_result
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.result.query_result import QueryResult
-    from msgflow.sql.value import Value
 
 # Named queries that pages show, with the numbers of `msgflow query`.
 NAMED = (

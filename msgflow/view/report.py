@@ -10,22 +10,28 @@ import gzip
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import duckdb
 import pyarrow as pa
 from pyarrow import compute
 
 from msgflow.db.finding import read_findings
 from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
+from msgflow.query.compare import Comparison
 from msgflow.query.compare import compare as compare_runs
+from msgflow.result.query_result import QueryResult
+from msgflow.run.choice import Run
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
 from msgflow.text.values import format_duration
+from msgflow.verify.verify import Verification
 from msgflow.view.assets import single_page
 from msgflow.view.page_query import Question, run_page_query
 from msgflow.view.pages import LEVEL_BINS, NAMED, SUMMARY, Pages, named
 from msgflow.view.summary import (
+    Section,
     change_section,
     encoded_comparison,
     encoded_section,
@@ -33,15 +39,6 @@ from msgflow.view.summary import (
     verdict_section,
 )
 from msgflow.view.table_encoding import encode
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.query.compare import Comparison
-    from msgflow.result.query_result import QueryResult
-    from msgflow.run.choice import Run
-    from msgflow.verify.verify import Verification
-    from msgflow.view.summary import Section
 
 MARKDOWN = ".md"
 # Pictures of at most so many paths: of those with the slowest flows.

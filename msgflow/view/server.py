@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 from urllib.parse import urlsplit
 
 import anyio
@@ -32,6 +32,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import Request
 from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.routing import Route
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from msgflow.errors import MsgflowError, QueryError, UsageError
 from msgflow.sql.failure import first_line
@@ -41,11 +42,8 @@ from msgflow.view.kept_token import kept_token
 from msgflow.view.shared_database import ReplacedError, SharedDatabase, UnopenedError
 from msgflow.view.sql_page import Sql, encoded_error, encoded_rows, most_rows
 
-if TYPE_CHECKING:
-    from starlette.types import ASGIApp, Receive, Scope, Send
-
-    # It is told, when a question starts, how to end that.
-    Started = Callable[[Callable[[], None]], None]
+# It is told, when a question starts, how to end that.
+Started = Callable[[Callable[[], None]], None]
 
 HOST = "127.0.0.1"
 DEFAULT_PORT = 8642

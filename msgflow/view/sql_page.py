@@ -5,20 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
+import duckdb
 import pyarrow as pa
 from pyarrow import compute
 
 from msgflow.errors import UsageError
 from msgflow.files.resources import resource_directory
+from msgflow.result.query_result import QueryResult
 from msgflow.text.json_value import json_text, json_value
 from msgflow.view.table_encoding import encode
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.result.query_result import QueryResult
 
 # As many as `msgflow sql` prints; the most that a browser sorts and draws without a pause.
 DEFAULT_ROWS = 1_000

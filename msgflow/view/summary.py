@@ -9,31 +9,29 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import pyarrow as pa
 
+from msgflow.db.finding import Finding
 from msgflow.errors import NoFlowError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import load_query
+from msgflow.query.compare import Comparison
 from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection
 from msgflow.query.why import explain
 from msgflow.result.query_result import QueryResult
 from msgflow.result.rows import cells
+from msgflow.run.choice import Run
 from msgflow.sql.quoting import literal
+from msgflow.sql.value import Value
 from msgflow.text.markdown import code, code_lines, markdown_line, rule_line
 from msgflow.text.shell import shell_joined
 from msgflow.text.values import format_cell
+from msgflow.verify.verify import Verification
+from msgflow.view.page_query import Question
 from msgflow.view.table_encoding import encode_result
-
-if TYPE_CHECKING:
-    from msgflow.db.finding import Finding
-    from msgflow.query.compare import Comparison
-    from msgflow.run.choice import Run
-    from msgflow.sql.value import Value
-    from msgflow.verify.verify import Verification
-    from msgflow.view.page_query import Question
 
 # The slowest paths whose latency is taken apart.
 MOST_PATHS = 3

@@ -13,17 +13,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 from pyarrow import compute
 
+from msgflow.result.query_result import QueryResult
 from msgflow.text.values import printable
 from msgflow.trace.numpy_arrow import is_valid, to_numpy
-
-if TYPE_CHECKING:
-    from msgflow.result.query_result import QueryResult
 
 LARGEST_EXACT = 2**53
 _EPOCH = "epoch ns"

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import duckdb
 
 from msgflow.errors import NoFlowError
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.query.why import explain
 from msgflow.run.slice import Slice
+from msgflow.run.window import Window
 from msgflow.sql.statement import internal_sql, registered
 from msgflow.text.values import format_duration
 from msgflow.verify.metrics import ENDS
+from msgflow.verify.targets_file import TargetsFile
 from msgflow.verify.verify import Verdict, verify
 from msgflow.verify.worst_case import take_of
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.run.window import Window
-    from msgflow.verify.targets_file import TargetsFile
 
 Row = dict[str, Any]
 

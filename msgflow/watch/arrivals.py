@@ -6,10 +6,8 @@ import time
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from msgflow.watch.chunk import Chunk
+from msgflow.watch.chunk import Chunk
 
 _SECOND_NS = 1_000_000_000
 # A source without a chunk for so many steps, or so many times the length of its last chunk, has

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import socket
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgflow.errors import UsageError
 from msgflow.text.values import format_duration
 from msgflow.verify.verify import Verdict
 from msgflow.watch.alarm import violation_line
-
-if TYPE_CHECKING:
-    from msgflow.watch.window_report import WindowReport
+from msgflow.watch.window_report import WindowReport
 
 TOPIC = "/diagnostics"
 NODE = "msgflow_watch"

@@ -11,15 +11,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import KW_ONLY, dataclass
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import MsgflowError
 from msgflow.ingest import ingest
+from msgflow.links.links_file import LinksFile
+from msgflow.watch.kept_chunk import KeptTraces
 from msgflow.watch.learned_answers import LEARNED_FILE
-
-if TYPE_CHECKING:
-    from msgflow.links.links_file import LinksFile
-    from msgflow.watch.kept_chunk import KeptTraces
 
 _DATABASE = "msgflow.duckdb"
 # A directory is ours, and may be removed, if this file is in it. It holds the end of the violation.

@@ -6,17 +6,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import TraceError
 from msgflow.sql.interrupt import noted_interrupts
 from msgflow.watch.arrivals import PATIENCE, Arrivals, by_arrival
-from msgflow.watch.chunk import ChunkFinder, finished_chunks
-
-if TYPE_CHECKING:
-    from msgflow.watch.chunk import Chunk
-    from msgflow.watch.watcher import Watcher
-    from msgflow.watch.window_report import WindowReport
+from msgflow.watch.chunk import Chunk, ChunkFinder, finished_chunks
+from msgflow.watch.watcher import Watcher
+from msgflow.watch.window_report import WindowReport
 
 # Seconds.
 _BETWEEN_LOOKS = 0.1

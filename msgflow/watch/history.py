@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from msgflow.run.window import Window
-from msgflow.watch.kept_chunk import KeptTraces
-
-if TYPE_CHECKING:
-    from msgflow.watch.kept_chunk import KeptChunk
+from msgflow.watch.kept_chunk import KeptChunk, KeptTraces
 
 # One takes up to two kilobytes of memory while it is analysed.
 _MOST_EVENTS = 250_000

@@ -8,25 +8,21 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from numpy.typing import NDArray
 
 from msgflow import trace as trace_package
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.load import wanted_events
-from msgflow.trace import PACKET, EventBatch, TraceSet
+from msgflow.trace import PACKET, Continuation, Damage, EventBatch, TraceInfo, TraceSet
 from msgflow.trace.archive import Unpacked
 from msgflow.trace.numpy_arrow import to_arrow, to_numpy
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from msgflow.trace import Continuation, Damage, TraceInfo
-    from msgflow.trace.trace_set import Batches, Report, Wanted
-    from msgflow.watch.chunk import Chunk
+from msgflow.trace.trace_set import Batches, Report, Wanted
+from msgflow.watch.chunk import Chunk
 
 
 @dataclass(frozen=True, eq=False)

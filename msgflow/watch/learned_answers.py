@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import duckdb
 
 from msgflow.files.yaml_file import quoted
 from msgflow.links.links_file import LinksFile, read_links
-
-if TYPE_CHECKING:
-    import duckdb
 
 LEARNED_FILE = "links.yaml"
 _PAIRS = """

@@ -7,15 +7,11 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.errors import RecordingError, UsageError
-from msgflow.record.lttng import sessions
+from msgflow.record.lttng import Session, sessions
 from msgflow.record.session import rotated
 from msgflow.text.name_suggestions import did_you_mean
-
-if TYPE_CHECKING:
-    from msgflow.record.lttng import Session
 
 # Seconds between two looks which sessions are there.
 _BETWEEN_LOOKS = 1.0

@@ -7,28 +7,23 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgflow.clocks.clocks_file import ClockSync
 from msgflow.errors import TraceError, UsageError
 from msgflow.ingest.repeated_in_memory import database_in_memory, ingest_again, link_again
+from msgflow.links.links_file import DeclaredLink, LinksFile
 from msgflow.run.window import Window
 from msgflow.sql.interrupt import interruptible
 from msgflow.trace import Continuation
+from msgflow.watch.alarm import Alarm
+from msgflow.watch.chunk import Chunk
+from msgflow.watch.flight_recorder import FlightRecorder
 from msgflow.watch.history import History
-from msgflow.watch.kept_chunk import read_chunk
+from msgflow.watch.kept_chunk import KeptTraces, read_chunk
 from msgflow.watch.learned_answers import LearnedAnswers, with_learned
-from msgflow.watch.window_report import report_of
-
-if TYPE_CHECKING:
-    from msgflow.links.links_file import DeclaredLink, LinksFile
-    from msgflow.watch.alarm import Alarm
-    from msgflow.watch.chunk import Chunk
-    from msgflow.watch.flight_recorder import FlightRecorder
-    from msgflow.watch.kept_chunk import KeptTraces
-    from msgflow.watch.prometheus import Exporter
-    from msgflow.watch.window_database import WindowDatabase
-    from msgflow.watch.window_report import WindowReport
+from msgflow.watch.prometheus import Exporter
+from msgflow.watch.window_database import WindowDatabase
+from msgflow.watch.window_report import WindowReport, report_of
 
 _RUN = "watch"
 _SECOND_NS = 1_000_000_000

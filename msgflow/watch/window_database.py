@@ -6,14 +6,11 @@ import os
 import time
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING
 
 from msgflow.db import empty_database
 from msgflow.ingest import ingest
-
-if TYPE_CHECKING:
-    from msgflow.links.links_file import LinksFile
-    from msgflow.watch.kept_chunk import KeptTraces
+from msgflow.links.links_file import LinksFile
+from msgflow.watch.kept_chunk import KeptTraces
 
 
 class WindowDatabase:

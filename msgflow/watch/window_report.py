@@ -6,17 +6,15 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import duckdb
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
+from msgflow.run.window import Window
 from msgflow.text.json_value import json_value
-
-if TYPE_CHECKING:
-    import duckdb
-
-    from msgflow.run.window import Window
 
 Row = dict[str, Any]
 
