@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 from analysis import Analyse, Analysis
-from kernel_schedule import BLOCKED, HOG, MAIN, Kernel, call, recorded
+from kernel_schedule import BLOCKED, HOG, KERNEL, MAIN, Kernel, call, recorded
 from ros_system import RosSystem
 from staged_events import Thread
+from thorough import few
 
 OTHER = 6
 
@@ -84,15 +85,19 @@ def test_a_callback_counts_only_its_own_part(system: RosSystem, analyse: Analyse
     assert of_callback(model) == [(0, 0, 100), (HOG, 200, 0)]
 
 
-@pytest.mark.thorough
-def test_a_thread_that_migrates_waits_for_another_cpu(system: RosSystem, analyse: Analyse) -> None:
-    kernel = Kernel(system)
-    kernel.switch(800, 0, OTHER, cpu=1)
-    kernel.switch(900, 0, 41)
-    kernel.switch(1100, 41, HOG)
-    kernel.add("sched_migrate_task", 1200, tid=41, dest_cpu=1)
-    kernel.switch(1300, OTHER, 41, cpu=1)
-    kernel.switch(1500, 41, 0, BLOCKED, cpu=1)
+@pytest.mark.parametrize("traces", few([1, 2], 2))
+def test_a_thread_that_migrates_waits_for_another_cpu(
+    system: RosSystem, analyse: Analyse, traces: int
+) -> None:
+    """Two kernel traces have the same migrations and switches."""
+    for trace in range(traces):
+        kernel = Kernel(system, KERNEL + trace)
+        kernel.switch(800, 0, OTHER, cpu=1)
+        kernel.switch(900, 0, 41)
+        kernel.switch(1100, 41, HOG)
+        kernel.add("sched_migrate_task", 1200, tid=41, dest_cpu=1)
+        kernel.switch(1300, OTHER, 41, cpu=1)
+        kernel.switch(1500, 41, 0, BLOCKED, cpu=1)
     system.add("ros2:callback_start", MAIN, ts=1000, callback=0xC1, is_intra_process=0)
     system.add("ros2:callback_end", Thread(100, cpu=1), ts=1400, callback=0xC1)
     model = analyse(system)

@@ -3,8 +3,10 @@
 --     where the trace has no migrations, for that on which it goes on.
 -- grain: one row per wait and CPU
 -- when: staging.schedule_interval
+
+-- Two kernel traces of a host have the same migrations.
 WITH migration AS (
-    SELECT t.thread_id, t.tid, m.ts_ns + s.shift_ns AS at_ns, m.dest_cpu AS cpu
+    SELECT DISTINCT t.thread_id, t.tid, m.ts_ns + s.shift_ns AS at_ns, m.dest_cpu AS cpu
     FROM raw.sched_migrate_task AS m
     JOIN staging.schedule AS s ON m.trace_index = s.trace_index
     JOIN staging.thread_tid AS t ON staging.has_tid(t, s.clock_key, m.tid, m.ts_ns + s.shift_ns)
