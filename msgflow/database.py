@@ -496,11 +496,11 @@ class Database:
             UsageError: not exactly one run, or no such place or time.
             NoFlowError: no flow arrives there.
         """
-        from msgflow.query.why import explain, with_functions
+        from msgflow.query.why import explain
 
         one = self._ask(Slice(part.get("run")).one_run, "an explanation")
         times = Slice(one.run_id, part.get("start"), part.get("end"))
-        return self._ask(with_functions, self._ask(explain, one, times, place), times)
+        return self._ask(explain, one, times, place)
 
     def flow(
         self,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-import time
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
+from threading import Thread
 from typing import Annotated
 
 import typer
@@ -13,11 +13,11 @@ import typer
 from msgflow.cli.operation import operation
 from msgflow.cli.options import LAKE_PAGE
 from msgflow.cli.output import print_note, print_status
-from msgflow.errors import UsageError
+from msgflow.errors import MsgflowError, UsageError
 from msgflow.files.default_files import DEFAULT_DATABASE
-from msgflow.sql.interrupt import noted_interrupts
 
-_SECONDS_BETWEEN_CHECKS = 0.1
+# Without a limit, Windows would not notice Ctrl-C.
+_SECONDS_BETWEEN_LOOKS = 0.1
 
 
 @operation
@@ -57,18 +57,19 @@ def command(
             sql = WarmSql(database, memory_limit=memory_limit, seconds=MOST_SECONDS)
             stack.callback(sql.close)
             server = serving(database, sql, port=port, memory_limit=memory_limit)
-        interrupts = stack.enter_context(noted_interrupts())
-        address = stack.enter_context(server)
+        address, thread = stack.enter_context(server)
         print_status(address)
         print_status("Ctrl-C ends it")
         if browser and not _open(address):
             print_note("no browser could be opened here: open the address yourself")
-        while True:
-            interrupts.check()
-            time.sleep(_SECONDS_BETWEEN_CHECKS)
+        while thread.is_alive():
+            thread.join(_SECONDS_BETWEEN_LOOKS)
+        raise MsgflowError("the server of the pages has ended")
 
 
-def _serving_lake(lake: str, where: str | None, port: int | None) -> AbstractContextManager[str]:
+def _serving_lake(
+    lake: str, where: str | None, port: int | None
+) -> AbstractContextManager[tuple[str, Thread]]:
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_page import lake_page
     from msgflow.view.server import serving_application, single_application

@@ -173,9 +173,11 @@ def command(
                 show_screen(reports)
                 return
             for report in reports:
+                if json:
+                    print_lines([report.to_json()])
+                    continue
                 violated = (f"violation: {violation_line(each)}" for each in report.violations)
-                text = [window_line(report), *map(printable, violated)]
-                print_lines([report.to_json()] if json else text)
+                print_lines([window_line(report), *map(printable, violated)])
 
         def live(place: Path, is_over: Callable[[], bool]) -> None:
             show(watch_live(place, watcher, step_ns=step_ns, is_over=is_over, note=print_note))
@@ -257,7 +259,10 @@ def _pages(port: int | None, clock_sync: str) -> Iterator[WindowDatabase | None]
         database = WindowDatabase(path, clock_sync=clock_sync)
         with (
             closing(WarmSql(path, memory_limit=None, seconds=MOST_SECONDS)) as sql,
-            serving(path, sql, port=port, following=database, place="msgflow watch") as address,
+            serving(path, sql, port=port, following=database, place="msgflow watch") as (
+                address,
+                _,
+            ),
         ):
             print_status(address)
             yield database

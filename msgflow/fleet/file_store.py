@@ -143,8 +143,14 @@ class Store:
             Entry(info.path[above:], info.size, info.mtime_ns or 0)
             for info in self._found(path, fs.FileType.File, recursive=recursive)
         ]
-        here = [entry for entry in found if not self._is_elsewhere(entry.path)]
+        folders = {entry.path.rpartition("/")[0] for entry in found}
+        elsewhere = {folder for folder in folders if self._is_elsewhere(folder)}
+        elsewhere |= {entry.path for entry in found if self._is_link(entry.path)}
+        here = (e for e in found if elsewhere.isdisjoint((e.path, e.path.rpartition("/")[0])))
         return sorted(here, key=lambda entry: entry.path)
+
+    def _is_link(self, path: str) -> bool:
+        return self.is_local and not self._follows_links and os.path.islink(self.full(path))
 
     def folders(self, path: str = "") -> list[str]:
         """Return the names of the folders directly below a path, sorted."""

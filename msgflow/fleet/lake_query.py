@@ -43,8 +43,7 @@ DEFAULT_LIMIT = 10
 _LISTS = re.compile(
     r"\b(show|describe|summarize|information_schema|duckdb_\w+|pragma_\w+)\b", re.IGNORECASE
 )
-# DuckDB says this of a statement when files have other columns.
-# Of one column, and of one among COLUMNS.
+# What DuckDB says where files lack a column, that of a statement or one among its COLUMNS.
 _LACKING = re.compile(r'(?:does not have a column named|Column) "(\w+)"')
 _BUCKETS = "distributed"
 STATEMENTS = Statements(Path(__file__).parent / "sql")

@@ -95,6 +95,7 @@ def corrections_of(con: duckdb.DuckDBPyConnection) -> Corrections:
     known = con.execute("FROM given_namespace").fetchnumpy()
     for table in (*_OF_SESSIONS, *_IN_COMMON):
         con.execute(f"DROP TABLE temp.{table}")
+    con.execute("DROP VIEW IF EXISTS temp.thread_event")
     given = known["procname"].tolist()
     names = {name: number for number, name in enumerate(dict.fromkeys(given))}
     numbers = np.array([names[name] for name in given], np.int64)

@@ -187,13 +187,11 @@ def _explained(
     waits = _rows(connection, _OWN_WAITS, waits, "result", callbacks=callbacks)
     losses = _rows(connection, _OWN_LOSSES, losses, "result", places=places)
     paths = _rows(connection, _WORST_FIRST, paths, "result", path=path)
-    internal = internal_sql()
-    asked_for = {
-        "has_unknown": bool(ends_here) or _UNNAMED in places,
-        "since": ["--start", f"{skipped:g}s"] if skipped else [],
-    }
+    internal, since = internal_sql(), ["--start", f"{skipped:g}s"] if skipped else []
+    asked_for = {"has_unknown": bool(ends_here) or _UNNAMED in places, "since": since}
     with registered(connection, piece=flow.table, loss=losses.table):
         steps = internal.run(connection, "next_command", asked_for).fetchall()
+    computes = _functions(connection, run, {**values, "callbacks": callbacks}, since)
     sentences = " ".join(verdict["sentence"].to_pylist())
     notes = [cure for unknown, cure in _UNKNOWN.items() if unknown in sentences]
     if skipped:
@@ -202,6 +200,7 @@ def _explained(
             " 0s reads them, too)"
         )
     notes += [*ends_here, *_outlier(run, paths.table.to_pylist()[0]), *paths.notes, *flow.notes]
+    notes += computes[0]
     return Explanation(
         run=run,
         start=times.start,
@@ -214,7 +213,7 @@ def _explained(
         ),
         waits=waits,
         losses=losses,
-        steps=tuple(tuple(words) for (words,) in steps),
+        steps=(*(tuple(words) for (words,) in steps), *computes[1]),
         notes=tuple(dict.fromkeys(notes)),
     )
 
@@ -268,23 +267,17 @@ def _rows(
         return replace(of, table=connection.sql(sql, params=values).to_arrow_table())
 
 
-def with_functions(
-    connection: duckdb.DuckDBPyConnection, found: Explanation, times: Slice
-) -> Explanation:
-    """Add a sentence: the callback that computes most, and three functions, where samples are."""
-    callbacks = [[row["node"], row["what"]] for row in found.nodes.table.to_pylist()]
-    run_id = found.run.run_id
-    if not callbacks or not connection.execute(_SAMPLED, [run_id]).fetchall():
-        return found
-    asked = {"run_id": run_id, "callbacks": callbacks}
-    asked |= replace(times, start=found.start).window([found.run]).bindings
+def _functions(
+    connection: duckdb.DuckDBPyConnection, run: Run, values: Mapping[str, Any], since: list[str]
+) -> tuple[list[str], list[tuple[str, ...]]]:
+    """Return a sentence on the callback that computes most, where samples are, and a command."""
+    if not connection.execute(_SAMPLED, [run.run_id]).fetchall():
+        return [], []
+    asked = {"run_id": run.run_id, **values}
     rows = internal_sql().run(connection, "callback_function", asked).fetchall()
     if not rows:
-        return found
+        return [], []
     node, callback, *_, samples = rows[0]
     shares = ", ".join(f"{function} {100 * share:.0f} %" for *_, function, share, _ in rows)
     said = f"CPU time of {node} {callback}: {shares} (of {samples:,} samples)"
-    step = ["query", "functions", "--node", node, "--callback", callback]
-    if times.start is None and found.start is not None:
-        step += ["--start", str(found.start)]
-    return replace(found, notes=(*found.notes, said), steps=(*found.steps, tuple(step)))
+    return [said], [("query", "functions", "--node", node, "--callback", callback, *since)]

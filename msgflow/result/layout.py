@@ -153,7 +153,8 @@ def _is_nothing(column: pa.ChunkedArray) -> bool:
     # Nothing is what Python counts as false: NULL, 0, false, an empty text or list. Where there is
     # something, the first rows mostly have it. Arrow's own functions take longer to import.
     first = column.slice(0, MOST_ROWS)
-    return not any(first.to_pylist()) and not any(column.to_pylist())
+    is_empty = column.null_count == len(column)
+    return is_empty or not (any(first.to_pylist()) or any(column.to_pylist()))
 
 
 def _title(result: Rows, name: str) -> str:

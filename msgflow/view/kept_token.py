@@ -12,6 +12,7 @@ from pathlib import Path
 
 _BYTES = 24
 # Neither a link nor a pipe is followed or waited for.
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 _FLAGS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK
 _OF_OTHERS = stat.S_IRWXG | stat.S_IRWXO
 _TOKEN = re.compile(rb"[\w-]{32}")
@@ -50,8 +51,8 @@ def _keep(path: Path, token: str) -> str:
     path.parent.mkdir(mode=stat.S_IRWXU, parents=True, exist_ok=True)
     aside = path.with_name(f"{path.name}.{secrets.token_hex(_BYTES)}.part")
     try:
-        aside.touch(stat.S_IRUSR | stat.S_IWUSR, exist_ok=False)
-        aside.write_text(token)
+        with open(os.open(aside, _NEW, stat.S_IRUSR | stat.S_IWUSR), "w") as file:
+            file.write(token)
         aside.replace(path)
     finally:
         aside.unlink(missing_ok=True)

@@ -317,8 +317,8 @@ def serving(
     memory_limit: str | None = None,
     following: Following | None = None,
     place: str | None = None,
-) -> Iterator[str]:
-    """Serve the pages of a database; yield their address, with the token.
+) -> Iterator[tuple[str, threading.Thread]]:
+    """Serve the pages of a database; see `serving_application` for what it yields.
 
     `port` is as for `listen`. Without `memory_limit`, DuckDB takes a quarter of the machine's
     memory, at least 500 MB and at most 4 GB. The token is that of `place`, by default of the path.
@@ -328,30 +328,33 @@ def serving(
         closing(SharedDatabase(path, memory_limit)) as shared,
         serving_application(
             place, port, lambda token: application(shared, token, sql, following)
-        ) as address,
+        ) as served,
     ):
-        yield address
+        yield served
 
 
 @contextmanager
 def serving_application(
     place: str, port: int | None, make: Callable[[str], ASGIApp]
-) -> Iterator[str]:
+) -> Iterator[tuple[str, threading.Thread]]:
     """Serve, in a thread, the application that `make` returns for the token of a place.
 
-    Yields the address, with the token.
+    Yields the address, with the token, and the thread.
     """
     with listen(port) as listener:
         token = kept_token(place)
         server = _server(make(token))
-        # In the main thread, Ctrl-C would end it halfway before it looks for signals itself.
-        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
-        thread.start()
+        # In the main thread, Ctrl-C could come before the server looks for signals itself. Nothing
+        # waits for this thread after a second Ctrl-C.
+        run = partial(server.run, sockets=[listener])
+        thread = threading.Thread(target=run, daemon=True)
         try:
-            yield f"http://{HOST}:{listener.getsockname()[1]}/?token={token}"
+            thread.start()
+            yield f"http://{HOST}:{listener.getsockname()[1]}/?token={token}", thread
         finally:
             server.should_exit = True
-            thread.join()
+            if thread.is_alive():
+                thread.join()
 
 
 def serve_text(address: str, port: int, make: Callable[[], bytes], media_type: str) -> None:

@@ -74,7 +74,7 @@ result AS (
 possible AS (
     SELECT goal_id, any_value(candidate_count) AS candidate_count FROM paired GROUP BY goal_id
 ),
--- Which goal feedback is of is not in the trace.
+-- The trace does not say of which goal feedback is: it counts where the server has one alone.
 told AS (
     SELECT a.goal_id, count(*) AS number, min(b.start_ns) AS first_ns, max(b.start_ns) AS last_ns
     FROM store.publication AS f

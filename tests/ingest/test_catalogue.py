@@ -56,9 +56,9 @@ def test_entries_are_well_formed(entries: list[dict[str, Any]]) -> None:
     for entry in entries:
         name = entry["name"]
         assert {"name", "description", "fields"} <= set(entry) <= TRACEPOINT_KEYS, name
+        assert entry.get("role", "begin") in get_args(catalogue.CpuRole), name
         if entry.get("is_kernel"):
             assert re.fullmatch(r"[a-z_]+", name), name
-            assert entry.get("role", "begin") in get_args(catalogue.CpuRole), name
             assert not {"sequences", "predecessors", "label"} & set(entry), name
         else:
             assert re.fullmatch(r"[a-z0-9_]+:[a-z0-9_]+", name), name

@@ -198,8 +198,10 @@ def test_an_incomplete_file_is_refused(text: str, message: str) -> None:
         ("-- note: moon", "note 'moon' is not one of callbacks"),
         ("-- param: a BIGINT  x\n-- param: a BIGINT  y", "'a' stands twice"),
         ("-- column: a BIGINT  x\n-- column: a BIGINT  y", "'a' stands twice"),
-        ("-- brief: a", "the header names a column that there is not: 'a'"),
-        ("-- zero: a", "the header names a column that there is not: 'a'"),
+        *(
+            (f"-- column: b BIGINT  x\n-- {key}: a", f"{key} names a column that there is not: 'a'")
+            for key in ("brief", "answer", "heading", "slowest", "zero")
+        ),
     ],
 )
 def test_what_breaks_a_rule_is_found(line: str, message: str) -> None:

@@ -14,13 +14,14 @@ from each import each
 from header_rules import faults
 from sql_files import LAYERS, SqlFile, sql_files, sql_paths
 
+import msgflow
 from msgflow.cli.operation import OWN
 from msgflow.cli.query_command import build_command
 from msgflow.database import Database
 from msgflow.db import objects
 from msgflow.query.catalogue import load_query
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
-from msgflow.sql.header import SCHEMAS, Header
+from msgflow.sql.header import SCHEMAS, Header, read
 from msgflow.sql.statement import RECORDED, internal_sql
 from msgflow.view.page_query import DIRECTORY, page_query
 
@@ -28,6 +29,8 @@ FILES = sql_files()
 QUERIES = [file for file in FILES if file.layer == "queries"]
 VIEWS = [file for file in FILES if file.layer in objects.VIEW_LAYERS and file.header.kind == "view"]
 MACROS = [file for file in FILES if file.layer == "public" and file.header.kind == "macro"]
+# What pages and a lake ask.
+OF_PACKAGE = [read(path) for path in sorted(Path(msgflow.__file__).parent.rglob("*.sql"))]
 # Parameters that name a table, and what the rows of it are.
 TABLES = {
     "outcomes": "main.end_to_end([1])",
@@ -247,9 +250,9 @@ def test_columns_of_a_view_are_those_of_its_output(
         assert output == declared(file)
 
 
-@each(FILES)
-def test_a_header_keeps_to_the_rules(file: SqlFile) -> None:
-    assert list(faults(file.path.read_text(encoding="utf-8"), file.header)) == []
+@each([*(file.header for file in FILES), *OF_PACKAGE], name=lambda header: str(header.path))
+def test_a_header_keeps_to_the_rules(header: Header) -> None:
+    assert list(faults(header.path.read_text(encoding="utf-8"), header)) == []
 
 
 @pytest.mark.thorough

@@ -1,4 +1,4 @@
-"""What the header of an SQL file must keep to, besides what it can be read without."""
+"""Rules for headers of SQL files that the program does not need in order to read them."""
 
 from __future__ import annotations
 
@@ -41,10 +41,12 @@ def faults(text: str, header: Header) -> Iterator[str]:
     columns = [column.name for column in header.columns]
     for names in ([param.name for param in header.params], columns):
         yield from (f"{name!r} stands twice" for name, count in Counter(names).items() if count > 1)
-    one = [name for name in (header.slowest, header.zero) if name is not None]
-    for name in (*header.brief, *header.answer, *header.heading, *one):
-        if name not in columns:
-            yield f"the header names a column that there is not: {name!r}"
+    named = {key: getattr(header, key) for key in ("brief", "answer", "heading")}
+    named |= {key: filter(None, [getattr(header, key)]) for key in ("slowest", "zero")}
+    for key, names in named.items():
+        for name in names:
+            if name not in columns:
+                yield f"{key} names a column that there is not: {name!r}"
     yield from chain.from_iterable(map(_of_param, (*header.params, *header.variants)))
 
 

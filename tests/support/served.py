@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -25,7 +26,7 @@ class Served:
     def __init__(self, path: Path, seconds: float = 30) -> None:
         self._sql = WarmSql(path, memory_limit="1GB", seconds=seconds)
         self._serving = serving(path, self._sql, port=0)
-        self.address = self._serving.__enter__()
+        self.address, _ = self._serving.__enter__()
         self.port = urlsplit(self.address).port
         self.token = self.address.partition("token=")[2]
 
@@ -49,7 +50,10 @@ class Served:
         return page.partition('data-generation="')[2].partition('"')[0]
 
     def close(self) -> None:
-        self._serving.__exit__(None, None, None)
+        closing = threading.Thread(target=self._serving.__exit__, args=[None] * 3, daemon=True)
+        closing.start()
+        closing.join(20)
+        assert not closing.is_alive(), "the server does not end"
         self._sql.close()
 
 

@@ -36,7 +36,10 @@ def followed(shared_traces: Path, tmp_path: Path) -> Iterator[Followed]:
     )
     with (
         closing(WarmSql(database.path, memory_limit=None, seconds=30)) as sql,
-        serving(database.path, sql, port=0, following=database, place="msgflow watch") as address,
+        serving(database.path, sql, port=0, following=database, place="msgflow watch") as (
+            address,
+            _,
+        ),
     ):
         yield address, watch_finished(shared_traces / "real_rotate", watcher)
 

@@ -134,7 +134,10 @@ def test_the_server_shows_the_page_anew(lake: Lake, page: Page) -> None:
         made.append(lake_page(lake, where="software_version = '1.1'").content)
         return made[-1]
 
-    with serving_application("lake", 0, lambda token: single_application(make, token)) as address:
+    with serving_application("lake", 0, lambda token: single_application(make, token)) as (
+        address,
+        _,
+    ):
         page.open(address)
         assert "5 of 10 runs" in page.page.locator(".said").inner_text()
         page.open(address)

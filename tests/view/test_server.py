@@ -23,7 +23,9 @@ import pytest
 from served import Served
 from tables import decoded
 from thorough import few
+from typer.testing import CliRunner
 
+from msgflow.cli.app import app
 from msgflow.cli.sql_process import WarmSql
 from msgflow.errors import QueryError, UsageError
 from msgflow.view import pages
@@ -326,7 +328,9 @@ class running_program:
         self.process.communicate()
 
 
-@pytest.mark.parametrize("number", few([signal.SIGINT, signal.SIGTERM], signal.SIGINT))
+@pytest.mark.parametrize(
+    "number", few([signal.SIGINT, signal.SIGTERM, signal.SIGHUP], signal.SIGINT)
+)
 def test_a_signal_ends_it(demo: Path, number: signal.Signals) -> None:
     with running_program(demo) as (process, address):
         assert address.startswith("http://127.0.0.1:")
@@ -336,7 +340,13 @@ def test_a_signal_ends_it(demo: Path, number: signal.Signals) -> None:
         assert time.monotonic() - begin < 10
         assert out == ""
         assert "Traceback" not in error
-        assert process.returncode in (0, 130, 143, -number)
+        assert process.returncode == (130 if number == signal.SIGINT else 143)
+
+
+def test_a_server_that_ends_by_itself_is_said(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("uvicorn.Server.run", lambda *_, **given: None)
+    done = CliRunner().invoke(app, ["ui", "--port", "0", "--no-browser", "--db", str(demo)])
+    assert (done.exit_code, str(done.exception)) == (1, "the server of the pages has ended")
 
 
 def test_without_a_browser_it_says_so(demo: Path) -> None:

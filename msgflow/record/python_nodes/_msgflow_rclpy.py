@@ -27,7 +27,7 @@ import weakref
 # More functions than that are no callbacks of a node, but made by it: they share a number.
 _MOST_FUNCTIONS = 10000
 _LONGEST_SYMBOL = 500
-# What rclcpp says of objects with callbacks, all of it with their handle, twice.
+# Events of rclcpp on objects with callbacks. The handle of the object is both their arguments.
 _ANNOUNCED = {
     "Subscription": ("rclcpp_subscription_init", "rclcpp_subscription_callback_added"),
     "Timer": ("rclcpp_timer_callback_added",),

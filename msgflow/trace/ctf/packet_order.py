@@ -51,7 +51,7 @@ class Entry:
 
 
 OnDamage = Callable[[Entry, int, str], None]
-"""What gets damage: the packet, where in it (in bytes), and a message."""
+"""What hears of damage: the packet, where in it (in bytes), and a message."""
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class Packet:
 
 
 OnFileDamage = Callable[[Path, int, int, str], None]
-"""What gets damage: the file, the number of the packet, where in the file (in bytes), a message."""
+"""What hears of damage: the file, the number of the packet, where in the file, and a message."""
 
 
 def packets_of(path: Path, reader: HeaderReader, report: OnFileDamage) -> list[Packet]:

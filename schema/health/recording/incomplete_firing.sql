@@ -14,5 +14,5 @@ SELECT
     || 'when the callback that publishes began (none yet, none since the caches were emptied, one '
     || 'that came only meanwhile, or a gap lies in between): see annotation_firing' AS detail
 FROM main.annotation_firing
-WHERE NOT is_complete
+WHERE linked_count < input_count
 GROUP BY run_id

@@ -8,7 +8,12 @@
 -- grain: one row per CPU
 -- severity: info
 -- when: store.thread_state
-WITH ran AS (
+WITH life AS (
+    SELECT thread_id, min(start_ns) AS start_ns, max(end_ns) AS end_ns
+    FROM main.thread_state
+    GROUP BY thread_id
+),
+ran AS (
     SELECT s.run_id, s.thread_id, s.cpu, sum(s.end_ns - s.start_ns) AS length_ns
     FROM main.thread_state AS s
     WHERE s.state = 'running'
@@ -18,9 +23,26 @@ WITH ran AS (
 ),
 -- A thread that may run elsewhere does so when its CPU is taken.
 bound AS (
-    SELECT run_id, thread_id, cpu
-    FROM ran
-    QUALIFY length_ns >= 0.99 * sum(length_ns) OVER (PARTITION BY thread_id)
+    SELECT r.run_id, r.thread_id, r.cpu, p.host_id, f.start_ns, f.end_ns
+    FROM ran AS r
+    JOIN life AS f ON r.thread_id = f.thread_id
+    JOIN main.thread AS t ON r.thread_id = t.thread_id
+    JOIN main.process AS p ON t.process_id = p.process_id
+    QUALIFY r.length_ns >= 0.99 * sum(r.length_ns) OVER (PARTITION BY r.thread_id)
+),
+-- A process that was started again shares nothing with what it was before.
+placed AS (
+    SELECT run_id, thread_id, cpu, host_id
+    FROM bound AS a
+    WHERE EXISTS (
+        SELECT 1
+        FROM bound AS b
+        WHERE b.host_id = a.host_id
+            AND b.cpu = a.cpu
+            AND b.thread_id <> a.thread_id
+            AND b.start_ns < a.end_ns
+            AND b.end_ns > a.start_ns
+    )
 )
 SELECT
     a.run_id,
@@ -31,9 +53,7 @@ SELECT
         derive.counted(count(*), 'thread'),
         string_agg(printf('%s %d', coalesce(t.name, '?'), t.tid), ', ' ORDER BY a.thread_id)
     ) AS detail
-FROM bound AS a
+FROM placed AS a
 JOIN main.thread AS t ON a.thread_id = t.thread_id
-JOIN main.process AS p ON t.process_id = p.process_id
-JOIN main.host AS h ON p.host_id = h.host_id
+JOIN main.host AS h ON a.host_id = h.host_id
 GROUP BY a.run_id, h.host_id, h.hostname, a.cpu
-HAVING count(*) > 1

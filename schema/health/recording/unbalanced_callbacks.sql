@@ -10,15 +10,29 @@
 -- severity: warning
 -- when: store.callback_instance WHERE end_ns IS NULL
 WITH unended AS (
-    SELECT callback_id, process_id, thread_id, start_ns
+    SELECT callback_instance_id, callback_id, process_id, thread_id, start_ns
     FROM main.callback_instance
     WHERE end_ns IS NULL AND NOT is_loss_affected
 ),
-last AS (
-    SELECT thread_id, max(start_ns) AS start_ns
+near AS (
+    SELECT thread_id, callback_id, start_ns
     FROM main.callback_instance
     WHERE thread_id IN (SELECT thread_id FROM unended)
-    GROUP BY thread_id
+),
+last AS (SELECT thread_id, max(start_ns) AS start_ns FROM near GROUP BY thread_id),
+open AS (
+    SELECT u.*
+    FROM unended AS u
+    JOIN last AS l ON u.thread_id = l.thread_id AND u.start_ns < l.start_ns
+),
+-- Others may have run inside before the gap came that has the end.
+cut AS (
+    SELECT i.callback_instance_id
+    FROM open AS i
+    ASOF JOIN main.thread_break AS b ON i.thread_id = b.thread_id AND i.start_ns < b.resumed_ns
+    ASOF LEFT JOIN near AS n
+        ON i.thread_id = n.thread_id AND i.callback_id = n.callback_id AND i.start_ns < n.start_ns
+    WHERE coalesce(b.resumed_ns <= n.start_ns, n.start_ns IS NULL)
 )
 SELECT
     p.run_id,
@@ -26,8 +40,8 @@ SELECT
     count(*) AS count,
     derive.counted(count(*), 'run') || ' of '
     || derive.counted(count(DISTINCT i.callback_id), 'callback') AS detail
-FROM unended AS i
-JOIN last AS l ON i.thread_id = l.thread_id AND i.start_ns < l.start_ns
+FROM open AS i
+ANTI JOIN cut AS c ON i.callback_instance_id = c.callback_instance_id
 JOIN main.process AS p ON i.process_id = p.process_id
 JOIN main.host AS h ON p.host_id = h.host_id
 GROUP BY p.run_id, p.process_id, p.name, p.pid, h.hostname

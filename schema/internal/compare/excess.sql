@@ -27,7 +27,7 @@ judged AS (
             WHEN NOT is_relative THEN format('{:.6g} ms more', more_ns / 1e6)
             WHEN a_ns = 0 THEN b_text || ', and 0 ms in A'
             WHEN a_ns > 0
-                THEN format('{:.4g} % more ({} to {})', 100 * more_ns / a_ns, a_text, b_text)
+                THEN format('{:.4g} % more ({} to {})', 100e0 * more_ns / a_ns, a_text, b_text)
         END AS reason,
         CASE WHEN NOT is_share AND b_ns IS NOT NULL THEN CASE verdict
             WHEN 'no difference shown' THEN '; it may be chance'
@@ -43,7 +43,7 @@ judged AS (
         WHEN is_share THEN a_share IS NOT NULL AND coalesce(points > allowed, true)
         WHEN a_ns IS NULL THEN false
         WHEN NOT is_relative THEN coalesce(more_ns > allowed, true)
-        ELSE a_ns < 0 OR coalesce(more_ns * 100 > allowed * a_ns, true)
+        ELSE a_ns < 0 OR coalesce(100e0 * more_ns > allowed * a_ns, true)
     END
 )
 SELECT text AS condition, subject, reason || coalesce(chance, '') AS reason, a_text

@@ -1,5 +1,5 @@
--- description: What was not recorded and rows of a query come from, a sentence each, by the note of
---     its header. Other events of a run may show that it has no requests or goals.
+-- description: What the rows of a query would come from, and was not recorded: a sentence each. The
+--     note of its header names it. Other events of a run may show that it has no requests or goals.
 -- grain: one row per sentence
 -- param: note VARCHAR  'requests', 'goals', 'kernel', 'samples' or 'callbacks'
 WITH lacking AS (

@@ -1,5 +1,5 @@
--- description: Where flows begin whose first publisher is not traced, a sentence for each topic
---     with which paths of a result (`noted`) begin so.
+-- description: A sentence for each topic at the begin of a path of a result (`noted`) whose
+--     publisher is not traced: where its flows begin.
 -- grain: one row per topic
 SELECT
     format(

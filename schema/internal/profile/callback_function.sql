@@ -1,5 +1,5 @@
--- description: The callback, of some, that samples found on a CPU most often, and the three
---     functions in which it was most of that time.
+-- description: Of some callbacks the one with most samples, and the three functions in which most
+--     of these were.
 -- grain: one row per function
 -- param: callbacks VARCHAR[][]  Node of each, and what triggers it
 WITH sampled AS (

@@ -1,6 +1,6 @@
--- description: Commands that show more of an explanation, as words behind msgflow: of what its path
---     lacks, links or names of topics; of the longest piece (`piece`) of its slow flow, and of that
---     flow; of lost messages (`loss`). What the trace has no name for cannot be asked for.
+-- description: Commands that show more of an explanation, as words behind msgflow. They are about
+--     what the path lacks, the longest piece (`piece`) of its slow flow, that flow, and messages
+--     that were lost (`loss`). What the trace has no name for cannot be asked for.
 -- grain: one row per command
 -- param: has_unknown BOOLEAN  The path lacks links, or names
 -- param: since VARCHAR[]      Options that leave out a warm-up

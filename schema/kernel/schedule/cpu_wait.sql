@@ -4,9 +4,9 @@
 -- grain: one row per wait and CPU
 -- when: staging.schedule_interval
 
--- Two kernel traces of a host have the same migrations.
+-- Two kernel traces of a host have the same migrations: those count of the trace of the wait.
 WITH migration AS (
-    SELECT DISTINCT t.thread_id, t.tid, m.ts_ns + s.shift_ns AS at_ns, m.dest_cpu AS cpu
+    SELECT m.trace_index, t.thread_id, t.tid, m.ts_ns + s.shift_ns AS at_ns, m.dest_cpu AS cpu
     FROM raw.sched_migrate_task AS m
     JOIN staging.schedule AS s ON m.trace_index = s.trace_index
     JOIN staging.thread_tid AS t ON staging.has_tid(t, s.clock_key, m.tid, m.ts_ns + s.shift_ns)
@@ -26,12 +26,19 @@ begin AS (
     FROM wait AS w
     LEFT JOIN staging.thread_waking AS k ON w.waking_event_id = k.event_id
     ASOF LEFT JOIN migration AS m
-        ON w.thread_id = m.thread_id AND w.tid = m.tid AND w.start_ns >= m.at_ns
+        ON w.trace_index = m.trace_index
+        AND w.thread_id = m.thread_id
+        AND w.tid = m.tid
+        AND w.start_ns >= m.at_ns
 ),
 cut AS (
     SELECT m.thread_id, m.tid, w.start_ns AS state_start_ns, m.at_ns AS start_ns, m.cpu
     FROM migration AS m
-    ASOF JOIN wait AS w ON m.thread_id = w.thread_id AND m.tid = w.tid AND m.at_ns > w.start_ns
+    ASOF JOIN wait AS w
+        ON m.trace_index = w.trace_index
+        AND m.thread_id = w.thread_id
+        AND m.tid = w.tid
+        AND m.at_ns > w.start_ns
     WHERE m.at_ns < w.end_ns
 ),
 part AS (
