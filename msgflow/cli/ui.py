@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
+from concurrent.futures import Future, wait
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
-from threading import Thread
 from typing import Annotated
 
 import typer
@@ -57,19 +57,19 @@ def command(
             sql = WarmSql(database, memory_limit=memory_limit, seconds=MOST_SECONDS)
             stack.callback(sql.close)
             server = serving(database, sql, port=port, memory_limit=memory_limit)
-        address, thread = stack.enter_context(server)
+        address, served = stack.enter_context(server)
         print_status(address)
         print_status("Ctrl-C ends it")
         if browser and not _open(address):
             print_note("no browser could be opened here: open the address yourself")
-        while thread.is_alive():
-            thread.join(_SECONDS_BETWEEN_LOOKS)
-        raise MsgflowError("the server of the pages has ended")
+        while not wait([served], _SECONDS_BETWEEN_LOOKS).done:
+            pass
+        raise MsgflowError("the server of the pages has ended") from served.exception()
 
 
 def _serving_lake(
     lake: str, where: str | None, port: int | None
-) -> AbstractContextManager[tuple[str, Thread]]:
+) -> AbstractContextManager[tuple[str, Future[None]]]:
     from msgflow.fleet.lake import Lake
     from msgflow.fleet.lake_page import lake_page
     from msgflow.view.server import serving_application, single_application

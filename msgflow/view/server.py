@@ -17,6 +17,7 @@ import re
 import socket
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -36,6 +37,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from msgflow.errors import MsgflowError, QueryError, UsageError
 from msgflow.sql.failure import first_line
+from msgflow.sql.interrupt import noted_interrupts
 from msgflow.view import assets
 from msgflow.view.connection import Connection, timed
 from msgflow.view.kept_token import kept_token
@@ -317,7 +319,7 @@ def serving(
     memory_limit: str | None = None,
     following: Following | None = None,
     place: str | None = None,
-) -> Iterator[tuple[str, threading.Thread]]:
+) -> Iterator[tuple[str, Future[None]]]:
     """Serve the pages of a database; see `serving_application` for what it yields.
 
     `port` is as for `listen`. Without `memory_limit`, DuckDB takes a quarter of the machine's
@@ -336,25 +338,22 @@ def serving(
 @contextmanager
 def serving_application(
     place: str, port: int | None, make: Callable[[str], ASGIApp]
-) -> Iterator[tuple[str, threading.Thread]]:
+) -> Iterator[tuple[str, Future[None]]]:
     """Serve, in a thread, the application that `make` returns for the token of a place.
 
-    Yields the address, with the token, and the thread.
+    Yields the address, with the token, and what the server ends with.
     """
-    with listen(port) as listener:
+    with listen(port) as listener, ThreadPoolExecutor(max_workers=1) as pool:
         token = kept_token(place)
         server = _server(make(token))
-        # In the main thread, Ctrl-C could come before the server looks for signals itself. Nothing
-        # waits for this thread after a second Ctrl-C.
-        run = partial(server.run, sockets=[listener])
-        thread = threading.Thread(target=run, daemon=True)
+        # In the main thread, Ctrl-C could come before the server looks for signals itself.
+        with noted_interrupts() as interrupts:
+            served = pool.submit(server.run, sockets=[listener])
         try:
-            thread.start()
-            yield f"http://{HOST}:{listener.getsockname()[1]}/?token={token}", thread
+            interrupts.check()
+            yield f"http://{HOST}:{listener.getsockname()[1]}/?token={token}", served
         finally:
             server.should_exit = True
-            if thread.is_alive():
-                thread.join()
 
 
 def serve_text(address: str, port: int, make: Callable[[], bytes], media_type: str) -> None:
