@@ -8,7 +8,6 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from msgflow.query.selection import KINDS
 from msgflow.run.window import format_epoch
@@ -170,8 +169,8 @@ def doubt_notes(
     if mark is None or way is None:
         return []
     noted = pa.table({"way": table[way], "mark": table[mark].cast(pa.bool_())})
-    # Most results need no note: this takes no time.
-    if not pc.any(noted["mark"]).as_py():
+    # Most results need no note. To import Arrow's functions takes longer than to look at each.
+    if not any(noted["mark"].to_pylist()):
         return []
     with registered(connection, noted=noted):
         return _sentences(connection, "doubt_note", {"runs": [run.run_id for run in runs]})

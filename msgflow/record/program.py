@@ -125,7 +125,7 @@ def require_program(name: str) -> None:
 def with_python_nodes(note: Callable[[str], None]) -> dict[str, str]:
     """Return an environment like ours, in which callbacks of rclpy are traced.
 
-    Where the folder cannot be used, `note` is told, and the environment is ours.
+    `note` says where the folder cannot be used; then the environment is ours.
     """
     environment = dict(os.environ)
     if (reason := _why_not(PYTHON_NODES)) is not None:

@@ -44,7 +44,7 @@ from msgflow.view.kept_token import kept_token
 from msgflow.view.shared_database import ReplacedError, SharedDatabase, UnopenedError
 from msgflow.view.sql_page import Sql, encoded_error, encoded_rows, most_rows
 
-# It is told, when a question starts, how to end that.
+# A question gives it, when it starts, the function that ends the question.
 Started = Callable[[Callable[[], None]], None]
 
 HOST = "127.0.0.1"

@@ -118,7 +118,7 @@ class SharedDatabase:
         generation: str | None,
         started: Callable[[Callable[[], None]], None],
     ) -> bytes:
-        """Return the answer to a question of a page; `started` is told how to end that."""
+        """Return the answer to a question of a page; `started` gets the function that ends it."""
         with self._changed:
             answers, base = self._current()
             self.require(generation)

@@ -74,7 +74,7 @@ result AS (
 possible AS (
     SELECT goal_id, any_value(candidate_count) AS candidate_count FROM paired GROUP BY goal_id
 ),
--- The trace does not say of which goal feedback is: it counts where the server has one alone.
+-- Feedback names no goal in the trace: it counts where the server has one goal alone.
 told AS (
     SELECT a.goal_id, count(*) AS number, min(b.start_ns) AS first_ns, max(b.start_ns) AS last_ns
     FROM store.publication AS f

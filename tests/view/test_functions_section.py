@@ -113,7 +113,7 @@ def test_a_flame_graph_says_what_samples_saw(
     assert {f"{_NAMES[0]}: 3 samples", f"{_NAMES[2]}: 1 sample"} <= set(titles)
     page.page.get_by_label("mark functions with this text").fill("<IMG")
     width = "() => +document.querySelector('.flame g[name=work] rect').getAttribute('width')"
-    # Frames grow into their places; before that their width is none to compare with.
+    # Frames grow into their places. Only then their widths can be compared.
     page.page.wait_for_function(
         f"async () => {{ const w = ({width})(); await new Promise(r => setTimeout(r, 500));"
         f" return w === ({width})(); }}"
