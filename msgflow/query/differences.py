@@ -8,9 +8,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import duckdb
 import pyarrow as pa
 
-from msgflow.db.sandbox import open_memory
 from msgflow.errors import UsageError
 from msgflow.query.selection import CUT_COLUMN
 from msgflow.sql.statement import internal_sql, registered
@@ -76,7 +76,7 @@ class Differences:
         Args:
             only_different: leave out those without a proven difference.
         """
-        with open_memory() as con, registered(con, compared=self.result.table):
+        with duckdb.connect() as con, registered(con, compared=self.result.table):
             table = internal_sql().run(con, "changes", {}).to_arrow_table()
         header = replace(internal_sql().header("changes"), name="changes")
         every = replace(self.result, table=table, header=header, notes=list(self.result.notes))
@@ -113,7 +113,7 @@ class Differences:
             )
         places = [vars(each) | {"place": place} for place, each in enumerate(wanted)]
         tables = {"compared": self.result.table, "condition": pa.Table.from_pylist(places)}
-        with open_memory() as con, registered(con, **tables):
+        with duckdb.connect() as con, registered(con, **tables):
             rows = internal_sql().run(con, "excess", {}).fetchall()
         for condition, subject, reason, a_text in rows:
             if reason is None:
