@@ -25,8 +25,6 @@ RULES = (
 )
 # The input of the rules, without the tables that it comes from.
 STAGE = """
-CREATE SCHEMA derive;
-CREATE SCHEMA store;
 CREATE TABLE published (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
     topic_name VARCHAR DEFAULT '/a', publisher_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
     publication_id BIGINT, written_ns BIGINT, next_event_ns BIGINT,
@@ -50,8 +48,6 @@ CREATE MACRO derive.unstamped_message(only_run) AS TABLE FROM message WHERE run_
 # Likewise of what messages say of two clocks.
 CLOCKS = ("clock_drift_limit", "clock_hull", "clock_line", "clock_line_error", "clock_pair")
 CLOCK_STAGE = """
-CREATE SCHEMA derive;
-CREATE SCHEMA store;
 CREATE TABLE bound (clock_id BIGINT DEFAULT 2, other_clock_id BIGINT DEFAULT 1,
     is_packet BOOLEAN DEFAULT false, sense INTEGER, at_ns BIGINT, bound_ns BIGINT);
 CREATE TABLE store.host (run_id BIGINT DEFAULT 1, host_id BIGINT, clock_id BIGINT);

@@ -11,22 +11,19 @@ import pytest
 from rules import derived
 from thorough import few
 
+TABLES = {
+    "store.publisher": "run_id = 1, publisher_id, process_id = 1, node_id = 1, created_ns",
+    "store.subscription": "run_id = 1, subscription_id, node_id = 1, created_ns",
+    "store.timer": "run_id = 1, process_id, period_ns, created_ns",
+    "store.take": "run_id = 1, take_id, subscription_id, thread_id, start_event_id, taken_ns",
+    "store.publication": (
+        "run_id = 1, publication_id, publisher_id, thread_id, start_event_id, start_ns, "
+        "trace_id = 1"
+    ),
+    "derive.exposed_trace": "trace_id, recording_id",
+    "derive.recording_gap": "recording_id, start_ns, covered_until_ns",
+}
 STAGE = """
-CREATE SCHEMA derive;
-CREATE SCHEMA store;
-CREATE TABLE store.publisher (run_id BIGINT DEFAULT 1, publisher_id BIGINT,
-    process_id BIGINT DEFAULT 1, node_id BIGINT DEFAULT 1, created_ns BIGINT);
-CREATE TABLE store.subscription (run_id BIGINT DEFAULT 1, subscription_id BIGINT,
-    node_id BIGINT DEFAULT 1, created_ns BIGINT);
-CREATE TABLE store.timer (run_id BIGINT DEFAULT 1, process_id BIGINT, period_ns BIGINT,
-    created_ns BIGINT);
-CREATE TABLE store.take (run_id BIGINT DEFAULT 1, take_id BIGINT, subscription_id BIGINT,
-    thread_id BIGINT, start_event_id BIGINT, taken_ns BIGINT);
-CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, publication_id BIGINT,
-    publisher_id BIGINT, thread_id BIGINT, start_event_id BIGINT, start_ns BIGINT,
-    trace_id BIGINT DEFAULT 1);
-CREATE TABLE derive.exposed_trace (trace_id BIGINT, recording_id BIGINT);
-CREATE TABLE derive.recording_gap (recording_id BIGINT, start_ns BIGINT, covered_until_ns BIGINT);
 INSERT INTO derive.exposed_trace VALUES (1, 1);
 CREATE VIEW link AS
 SELECT
@@ -73,7 +70,7 @@ class Process:
             + [(*publication, True) for publication in self.publications],
             key=lambda event: (event[0], event[3]),
         )
-        with derived(STAGE, NAMES) as con:
+        with derived(STAGE, NAMES, TABLES) as con:
             con.executemany(
                 "INSERT INTO store.publisher (publisher_id, created_ns) VALUES (?, ?)",
                 [(each, None if "publishers" in self.old else 0) for each in (ANSWER, TICK, TOCK)],

@@ -12,7 +12,6 @@ from thorough import few, thorough
 
 # A hundred values of side a, of side b all the same.
 STAGE = """
-CREATE SCHEMA derive;
 CREATE TABLE measure AS
 SELECT
     'a' AS side, 'x' AS subject, 100 AS number, [50, 95, 99] AS quantiles, 50.5 AS mean_ns,

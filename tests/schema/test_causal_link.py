@@ -9,37 +9,31 @@ import pytest
 from rules import derived
 
 # What the rules of each kind of link say, and what they read beside it.
+TABLES = {
+    "derive.link_causal_take_adjacent": (
+        "run_id = 1, thread_id = 1, take_id, subscription_id = 1, taken_ns, publication_id, "
+        "publisher_id = 1, start_ns"
+    ),
+    "derive.link_causal_polled": "run_id, take_id, publication_id, publisher_id, is_loss_affected",
+    "derive.link_causal_indirect": (
+        "run_id = 1, callback_instance_id, publication_id, kind = 'partial_sync', "
+        "annotation_id = 7, candidate_count = 2, is_loss_affected = false"
+    ),
+    "derive.mixed_publication": "publication_id",
+    "derive.declared_pair": "run_id = 1, kind, subscription_id = 1, publisher_id = 1",
+    "store.take": "run_id = 1, take_id, subscription_id = 1, is_loss_affected = false",
+    "store.publication": "run_id = 1, publication_id, publisher_id = 1, is_loss_affected = false",
+    "store.callback_instance": (
+        "run_id = 1, callback_instance_id, take_id, is_loss_affected = false"
+    ),
+    "store.thread_state": "run_id = 1, thread_id = 1, state = 'sleeping', start_ns, end_ns",
+}
 STAGE = """
-CREATE SCHEMA derive;
-CREATE SCHEMA store;
 CREATE TABLE link (run_id BIGINT DEFAULT 1, callback_instance_id BIGINT, take_id BIGINT,
     publication_id BIGINT, publisher_id BIGINT DEFAULT 1, kind VARCHAR DEFAULT 'direct',
     annotation_id BIGINT, candidate_count BIGINT DEFAULT 1, is_loss_affected BOOLEAN);
-CREATE TABLE adjacent (run_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1, take_id BIGINT,
-    subscription_id BIGINT DEFAULT 1, taken_ns BIGINT, publication_id BIGINT,
-    publisher_id BIGINT DEFAULT 1, start_ns BIGINT);
-CREATE TABLE doubtful (publication_id BIGINT);
-CREATE TABLE polled (run_id BIGINT, take_id BIGINT, publication_id BIGINT, publisher_id BIGINT,
-    is_loss_affected BOOLEAN);
-CREATE TABLE indirect (run_id BIGINT DEFAULT 1, callback_instance_id BIGINT, publication_id BIGINT,
-    kind VARCHAR DEFAULT 'partial_sync', annotation_id BIGINT DEFAULT 7,
-    candidate_count BIGINT DEFAULT 2, is_loss_affected BOOLEAN DEFAULT false);
-CREATE TABLE mixed (publication_id BIGINT);
-CREATE TABLE derive.declared_pair (run_id BIGINT DEFAULT 1, kind VARCHAR,
-    subscription_id BIGINT DEFAULT 1, publisher_id BIGINT DEFAULT 1);
-CREATE TABLE store.take (run_id BIGINT DEFAULT 1, take_id BIGINT, subscription_id BIGINT DEFAULT 1,
-    is_loss_affected BOOLEAN DEFAULT false);
-CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, publication_id BIGINT,
-    publisher_id BIGINT DEFAULT 1, is_loss_affected BOOLEAN DEFAULT false);
-CREATE TABLE store.callback_instance (run_id BIGINT DEFAULT 1, callback_instance_id BIGINT,
-    take_id BIGINT, is_loss_affected BOOLEAN DEFAULT false);
-CREATE TABLE store.thread_state (run_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
-    state VARCHAR DEFAULT 'sleeping', start_ns BIGINT, end_ns BIGINT);
-CREATE MACRO derive.mixed_publication(only_run) AS TABLE FROM mixed;
-CREATE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE FROM adjacent;
-CREATE MACRO derive.answer_doubtful(only_run, links) AS TABLE FROM doubtful;
-CREATE MACRO derive.link_causal_polled(only_run) AS TABLE FROM polled;
-CREATE MACRO derive.link_causal_indirect(only_run) AS TABLE FROM indirect;
+CREATE TABLE answer_doubtful (publication_id BIGINT);
+CREATE MACRO derive.answer_doubtful(only_run, links) AS TABLE FROM answer_doubtful;
 INSERT INTO store.take (take_id) VALUES (1), (2);
 """
 RULES = ("causal_link", "link_causal_by_hand", "link_causal_annotated")
@@ -48,7 +42,7 @@ BY_HAND = "SELECT take_id, publication_id, candidate_count FROM derive.link_caus
 
 @pytest.fixture
 def rules() -> Iterator[duckdb.DuckDBPyConnection]:
-    with derived(STAGE, RULES) as con:
+    with derived(STAGE, RULES, TABLES) as con:
         yield con
 
 
@@ -103,7 +97,7 @@ def test_a_publication_of_mixed_processes_has_a_second_candidate(
         "INSERT INTO link (publication_id, candidate_count, is_loss_affected) "
         "VALUES (1, 1, NULL), (2, 1, false), (3, 3, true)"
     )
-    rules.execute("INSERT INTO mixed VALUES (2), (3)")
+    rules.execute("INSERT INTO mixed_publication VALUES (2), (3)")
     found = rules.execute(
         "SELECT publication_id, candidate_count, is_loss_affected "
         "FROM derive.causal_link(1, 'link') ORDER BY ALL"
@@ -130,7 +124,8 @@ def test_a_thread_that_slept_since_the_take_begins_a_new_turn(
     rules.execute("INSERT INTO store.thread_state VALUES (1, 2, 'sleeping', 20, 31)")
     rules.execute("INSERT INTO store.thread_state VALUES (2, 1, 'sleeping', 20, 32)")
     rules.execute(
-        "INSERT INTO adjacent (take_id, taken_ns, publication_id, start_ns) VALUES (1, 10, 1, 50)"
+        "INSERT INTO link_causal_take_adjacent (take_id, taken_ns, publication_id, start_ns) "
+        "VALUES (1, 10, 1, 50)"
     )
     rules.execute("INSERT INTO store.publication (publication_id) VALUES (1)")
     assert rules.execute(BY_HAND).fetchall() == [(1, 1, candidates)]
@@ -151,10 +146,10 @@ def test_a_declared_answer_is_not_doubtful(
 ) -> None:
     rules.execute(f"INSERT INTO derive.declared_pair VALUES ({pair})")
     rules.execute(
-        "INSERT INTO adjacent (take_id, taken_ns, publication_id, start_ns) "
+        "INSERT INTO link_causal_take_adjacent (take_id, taken_ns, publication_id, start_ns) "
         "VALUES (1, 10, 1, 50), (2, 60, 2, 70)"
     )
-    rules.execute("INSERT INTO doubtful VALUES (1)")
+    rules.execute("INSERT INTO answer_doubtful VALUES (1)")
     rules.execute("INSERT INTO store.publication (publication_id) VALUES (1), (2)")
     found = rules.execute(f"{BY_HAND} ORDER BY ALL").fetchall()
     assert found == [(1, 1, candidates), (2, 2, 1)]
@@ -163,10 +158,10 @@ def test_a_declared_answer_is_not_doubtful(
 def test_lost_events_spoil_what_follows_a_take(rules: duckdb.DuckDBPyConnection) -> None:
     rules.execute("INSERT INTO store.take (take_id, is_loss_affected) VALUES (3, true)")
     rules.execute(
-        "INSERT INTO adjacent (take_id, taken_ns, publication_id, start_ns) "
+        "INSERT INTO link_causal_take_adjacent (take_id, taken_ns, publication_id, start_ns) "
         "VALUES (1, 10, 1, 11), (2, 20, 2, 21), (3, 30, 3, 31)"
     )
-    rules.execute("INSERT INTO polled VALUES (1, 1, 4, 1, false), (1, 2, 5, 1, true)")
+    rules.execute("INSERT INTO link_causal_polled VALUES (1, 1, 4, 1, false), (1, 2, 5, 1, true)")
     rules.execute(
         "INSERT INTO store.publication (publication_id, is_loss_affected) "
         "VALUES (1, false), (2, true), (3, false)"
@@ -188,7 +183,7 @@ def test_lost_events_spoil_what_annotations_tell(rules: duckdb.DuckDBPyConnectio
         "VALUES (1, false), (2, true), (3, false), (4, false)"
     )
     rules.execute(
-        "INSERT INTO indirect (callback_instance_id, publication_id, is_loss_affected) "
+        "INSERT INTO link_causal_indirect (callback_instance_id, publication_id, is_loss_affected) "
         "VALUES (1, 1, false), (1, 2, false), (2, 3, false), (1, 4, true)"
     )
     found = rules.execute(

@@ -11,8 +11,6 @@ from rules import derived
 RULES = ("clock_drift_limit", "corrected_ns", "recorded_ns", "clock_sync")
 SECOND = 10**9
 STAGE = """
-CREATE SCHEMA derive;
-CREATE SCHEMA store;
 CREATE TABLE store.clock AS SELECT
     1 AS run_id, unnest([1, 2, 3]) AS clock_id, 0::BIGINT AS reference_ns;
 CREATE TABLE pair (clock_id BIGINT, other_clock_id BIGINT, reference_ns BIGINT,

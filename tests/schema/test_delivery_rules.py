@@ -12,47 +12,45 @@ from thorough import examples, few
 
 MS = 1_000_000
 # The input of the rules, without the views and tables that it comes from.
+TABLES = {
+    "derive.expected_arrival": (
+        "run_id = 1, publication_id, publisher_id = 1, topic_name = '/a', clock_id = 1, "
+        "source_timestamp_ns = 1, arrival_ns, has_one_clock = true"
+    ),
+    "derive.subscription_life": (
+        "run_id = 1, subscription_id = 1, topic_name = '/a', process_id = 1, clock_id = 1, "
+        "queue_depth = 10, created_ns = 0, last_seen_ns = 10_000_000_000, replaced_ns, "
+        "host_end_ns = 10_000_000_000, only_thread_id = 1, shows_takes = true, "
+        "is_agnocast = false"
+    ),
+    "derive.process_gap": "process_id = 1, start_ns, covered_until_ns",
+    "store.publisher": "publisher_id, created_ns, process_id = 1",
+    "derive.copied_pair": "publisher_id, subscription_id",
+    "store.link_transport": (
+        "run_id = 1, publication_id, publisher_id = 1, subscription_id = 1, take_id, is_copy"
+    ),
+    "store.take": (
+        "run_id = 1, take_id, subscription_id = 1, taken_ns, source_timestamp_ns = 1, "
+        "method = 'rmw'"
+    ),
+    "store.publication": (
+        "run_id = 1, publication_id, publisher_id, process_id = 1, thread_id, end_ns"
+    ),
+    "store.process": "process_id, host_id",
+    "store.host": "host_id, clock_id",
+    "derive.clock_step": "clock_id = 1, start_ns, end_ns",
+    "store.callback_instance": "take_id, is_intra_process",
+    "derive.empty_take": "run_id = 1, subscription_id = 1, failed_ns",
+    "derive.hanging_callback": "run_id = 1, thread_id",
+    "derive.executor_interval": "run_id = 1, thread_id = 1, state = 'wait', start_ns, end_ns",
+}
 STAGE = """
-CREATE SCHEMA derive;
-CREATE SCHEMA store;
-CREATE TABLE derive.expected_arrival (run_id BIGINT DEFAULT 1, publication_id BIGINT,
-    publisher_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a', clock_id BIGINT DEFAULT 1,
-    source_timestamp_ns BIGINT DEFAULT 1, arrival_ns BIGINT, has_one_clock BOOLEAN DEFAULT true);
-CREATE TABLE derive.subscription_life (run_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1,
-    topic_name VARCHAR DEFAULT '/a', process_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
-    queue_depth BIGINT DEFAULT 10, created_ns BIGINT DEFAULT 0,
-    last_seen_ns BIGINT DEFAULT 10_000_000_000, replaced_ns BIGINT,
-    host_end_ns BIGINT DEFAULT 10_000_000_000, only_thread_id BIGINT DEFAULT 1,
-    shows_takes BOOLEAN DEFAULT true, is_agnocast BOOLEAN DEFAULT false);
-CREATE TABLE gap (process_id BIGINT DEFAULT 1, start_ns BIGINT, covered_until_ns BIGINT);
-CREATE MACRO derive.process_gap(only_run, has_gaps := true, has_pauses := true) AS TABLE FROM gap;
-CREATE TABLE store.publisher (publisher_id BIGINT, created_ns BIGINT,
-    process_id BIGINT DEFAULT 1);
-CREATE TABLE derive.copied_pair (publisher_id BIGINT, subscription_id BIGINT);
-CREATE TABLE store.link_transport (run_id BIGINT DEFAULT 1, publication_id BIGINT,
-    publisher_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1, take_id BIGINT,
-    is_copy BOOLEAN);
-CREATE TABLE store.take (run_id BIGINT DEFAULT 1, take_id BIGINT,
-    subscription_id BIGINT DEFAULT 1, taken_ns BIGINT, source_timestamp_ns BIGINT DEFAULT 1,
-    method VARCHAR DEFAULT 'rmw');
 CREATE VIEW store.orphan_take AS
     SELECT t.run_id, t.take_id
     FROM store.take AS t
     ANTI JOIN store.link_transport AS l ON t.take_id = l.take_id;
-CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, publication_id BIGINT,
-    publisher_id BIGINT, process_id BIGINT DEFAULT 1, thread_id BIGINT, end_ns BIGINT);
-CREATE TABLE store.process (process_id BIGINT, host_id BIGINT);
-CREATE TABLE store.host (host_id BIGINT, clock_id BIGINT);
-CREATE TABLE step (clock_id BIGINT DEFAULT 1, start_ns BIGINT, end_ns BIGINT);
-CREATE MACRO derive.clock_step(only_run) AS TABLE FROM step;
 INSERT INTO store.process VALUES (1, 1);
 INSERT INTO store.host VALUES (1, 1);
-CREATE TABLE store.callback_instance (take_id BIGINT, is_intra_process BOOLEAN);
-CREATE TABLE derive.empty_take (run_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1,
-    failed_ns BIGINT);
-CREATE TABLE derive.hanging_callback (run_id BIGINT DEFAULT 1, thread_id BIGINT);
-CREATE TABLE derive.executor_interval (run_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
-    state VARCHAR DEFAULT 'wait', start_ns BIGINT, end_ns BIGINT);
 INSERT INTO store.publisher VALUES (1, 0, 1), (2, 0, 1);
 """
 RULES = ("delivery_limit", "stretch", "undelivered")
@@ -121,7 +119,9 @@ class Delivery:
         )
 
     def misses(self, start: int, end: int) -> None:
-        self.con.execute("INSERT INTO gap (start_ns, covered_until_ns) VALUES (?, ?)", [start, end])
+        self.con.execute(
+            "INSERT INTO process_gap (start_ns, covered_until_ns) VALUES (?, ?)", [start, end]
+        )
 
     def reason(self, number: int) -> str:
         rows = self.con.execute(
@@ -133,7 +133,7 @@ class Delivery:
 
 @pytest.fixture
 def delivery() -> Iterator[Delivery]:
-    with derived(STAGE, RULES) as con:
+    with derived(STAGE, RULES, TABLES) as con:
         yield Delivery(con)
 
 
@@ -186,7 +186,7 @@ def test_while_the_clock_is_set_nothing_is_called_lost(
     delivery.waits(280 * MS, 310 * MS)
     delivery.publish(310 * MS, 310 * MS + 300_000)
     bounds = [None if bound is None else bound * MS for bound in (start, end)]
-    delivery.con.execute("INSERT INTO step VALUES (?, ?, ?)", [clock, *bounds])
+    delivery.con.execute("INSERT INTO clock_step VALUES (?, ?, ?)", [clock, *bounds])
     assert delivery.reason(missing) == reason
 
 
@@ -897,7 +897,7 @@ def fill(con: duckdb.DuckDBPyConnection, chance: random.Random, grid: int, begin
             ],
         )
         for start in chance.sample(moments, 2):
-            con.execute("INSERT INTO gap VALUES (?, ?, ?)", [number, start, start + 5 * MS])
+            con.execute("INSERT INTO process_gap VALUES (?, ?, ?)", [number, start, start + 5 * MS])
         for failed in chance.sample(moments, 3):
             con.execute("INSERT INTO derive.empty_take VALUES (1, ?, ?)", [number, failed + 1])
         start = begin

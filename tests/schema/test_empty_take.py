@@ -9,14 +9,10 @@ import pytest
 from rules import derived
 from thorough import few
 
-STAGE = """
-CREATE SCHEMA derive;
-CREATE SCHEMA store;
-CREATE TABLE store.failed_take (run_id BIGINT, subscription_id BIGINT, thread_id BIGINT,
-    failed_ns BIGINT);
-CREATE TABLE store.callback_instance (run_id BIGINT, callback_instance_id BIGINT,
-    thread_id BIGINT, start_ns BIGINT, end_ns BIGINT);
-"""
+TABLES = {
+    "store.failed_take": "run_id, subscription_id, thread_id, failed_ns",
+    "store.callback_instance": "run_id, callback_instance_id, thread_id, start_ns, end_ns",
+}
 
 
 @pytest.mark.parametrize("seed", few(range(3), 0))
@@ -24,7 +20,7 @@ CREATE TABLE store.callback_instance (run_id BIGINT, callback_instance_id BIGINT
 def test_the_length_of_a_stretch_decides_nothing(seed: int, length: int) -> None:
     """Whatever it is, the callback that began last before the attempt counts."""
     chance = random.Random(seed)
-    with derived(STAGE, ("stretch", "empty_take")) as con:
+    with derived("", ("stretch", "empty_take"), TABLES) as con:
         con.execute(f"CREATE OR REPLACE MACRO derive.stretch(at_ns) AS at_ns // {length}")
         callbacks = [
             (thread, start, None if chance.random() < 0.3 else start + chance.randrange(5))

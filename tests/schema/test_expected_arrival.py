@@ -9,8 +9,6 @@ from rules import derived
 # From 100 on messages tell how far their clocks are apart. Process 3 has another topic. Process 4
 # belongs to another run. /c has no subscription.
 STAGE = """
-CREATE SCHEMA derive;
-CREATE SCHEMA store;
 CREATE TABLE derive.process_clock AS FROM (
     VALUES (1, 1), (2, 2), (3, 3), (4, 4)
 ) AS p(process_id, clock_id);

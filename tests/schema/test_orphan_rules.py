@@ -11,44 +11,44 @@ from rules import derived
 MS = 1_000_000
 # One take of a message of /a; its publisher, process 1, is recorded from 100 to 900 ms.
 STAMP = 500 * MS
+TABLES = {
+    "store.take": (
+        "run_id = 1, take_id = 1, subscription_id = 1, process_id = 9, method = 'rmw', "
+        f"taken_ns = {STAMP + MS}, is_loss_affected = false, source_timestamp_ns = {STAMP}"
+    ),
+    "store.link_transport": (
+        "run_id = 1, take_id, publication_id, subscription_id = 1, method = 'ring_buffer'"
+    ),
+    "store.subscription": (
+        "run_id = 1, subscription_id = 1, process_id = 9, topic_name = '/a', created_ns, "
+        "is_inferred = false, is_internal = false"
+    ),
+    "store.publisher": (
+        "run_id = 1, process_id = 1, publisher_id = 1, topic_name = '/a', created_ns = 0, "
+        "is_inferred = false, is_internal = false"
+    ),
+    "store.callback_instance": "take_id, is_intra_process",
+    "store.node": "run_id = 1, process_id, is_inferred",
+    "store.publication": (
+        "run_id = 1, publication_id, process_id = 1, publisher_id = 1, source_timestamp_ns, end_ns"
+    ),
+    "store.process": (
+        f"process_id, host_id = 1, first_seen_ns = {100 * MS}, last_seen_ns = {900 * MS}"
+    ),
+    "store.trace": "run_id = 1, domain, start_ns",
+    "store.nearest_message": (
+        f"run_id = 1, topic_name = '/a', source_timestamp_ns = {STAMP}, publication_id, "
+        "candidate_count = 2"
+    ),
+    "derive.stamp_shift": "run_id = 1, host_id = 1, from_ns, shift_ns, greatest_shift_ns",
+    "derive.process_presence": (
+        f"run_id = 1, process_id = 1, begin_ns = {100 * MS}, recorded_from_ns = {100 * MS}"
+    ),
+    "derive.process_gap": "process_id = 1, start_ns, covered_until_ns",
+    "derive.take_candidate": "take_id",
+    "derive.unstamped_call": "process_id, publisher_id, is_without_event",
+}
 STAGE = f"""
-CREATE SCHEMA derive;
-CREATE SCHEMA store;
-CREATE TABLE store.take (run_id BIGINT DEFAULT 1, take_id BIGINT DEFAULT 1,
-    subscription_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT 9, method VARCHAR DEFAULT 'rmw',
-    taken_ns BIGINT DEFAULT {STAMP + MS}, is_loss_affected BOOLEAN DEFAULT false,
-    source_timestamp_ns BIGINT DEFAULT {STAMP});
-CREATE TABLE store.link_transport (run_id BIGINT DEFAULT 1, take_id BIGINT, publication_id BIGINT,
-    subscription_id BIGINT DEFAULT 1, method VARCHAR DEFAULT 'ring_buffer');
-CREATE TABLE store.subscription (run_id BIGINT DEFAULT 1, subscription_id BIGINT DEFAULT 1,
-    process_id BIGINT DEFAULT 9, topic_name VARCHAR DEFAULT '/a', created_ns BIGINT,
-    is_inferred BOOLEAN DEFAULT false, is_internal BOOLEAN DEFAULT false);
-CREATE TABLE store.publisher (run_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT 1,
-    publisher_id BIGINT DEFAULT 1,
-    topic_name VARCHAR DEFAULT '/a', created_ns BIGINT DEFAULT 0,
-    is_inferred BOOLEAN DEFAULT false, is_internal BOOLEAN DEFAULT false);
-CREATE TABLE store.callback_instance (take_id BIGINT, is_intra_process BOOLEAN);
-CREATE TABLE store.node (run_id BIGINT DEFAULT 1, process_id BIGINT, is_inferred BOOLEAN);
-CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, publication_id BIGINT,
-    process_id BIGINT DEFAULT 1, publisher_id BIGINT DEFAULT 1, source_timestamp_ns BIGINT,
-    end_ns BIGINT);
-CREATE TABLE store.process (process_id BIGINT, host_id BIGINT DEFAULT 1,
-    first_seen_ns BIGINT DEFAULT {100 * MS}, last_seen_ns BIGINT DEFAULT {900 * MS});
-CREATE TABLE store.trace (run_id BIGINT DEFAULT 1, domain VARCHAR, start_ns BIGINT);
-CREATE TABLE store.nearest_message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
-    source_timestamp_ns BIGINT DEFAULT {STAMP}, publication_id BIGINT,
-    candidate_count BIGINT DEFAULT 2);
-CREATE TABLE derive.stamp_shift (run_id BIGINT DEFAULT 1, host_id BIGINT DEFAULT 1, from_ns BIGINT,
-    shift_ns BIGINT, greatest_shift_ns BIGINT);
-CREATE TABLE derive.process_presence (run_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT 1,
-    begin_ns BIGINT DEFAULT {100 * MS}, recorded_from_ns BIGINT DEFAULT {100 * MS});
-CREATE TABLE missed (process_id BIGINT DEFAULT 1, start_ns BIGINT, covered_until_ns BIGINT);
-CREATE TABLE rival (take_id BIGINT);
-CREATE TABLE unstamped (process_id BIGINT, publisher_id BIGINT, is_without_event BOOLEAN);
-CREATE MACRO derive.unstamped_call(only_run) AS TABLE FROM unstamped;
-CREATE MACRO derive.process_gap(only_run, has_gaps := true, has_pauses := true) AS TABLE
-FROM missed;
-CREATE MACRO derive.take_candidate(only_run) AS TABLE FROM rival;
 INSERT INTO store.subscription (created_ns) VALUES (0);
 INSERT INTO store.process (process_id) VALUES (1), (2), (9);
 INSERT INTO store.publication (publication_id, process_id, source_timestamp_ns) VALUES (0, 9, 1);
@@ -69,7 +69,7 @@ BUFFERED = (
 
 @pytest.fixture
 def con() -> Iterator[duckdb.DuckDBPyConnection]:
-    with derived(STAGE, RULES) as connection:
+    with derived(STAGE, RULES, TABLES) as connection:
         yield connection
 
 
@@ -82,7 +82,7 @@ def reason(con: duckdb.DuckDBPyConnection, *statements: str) -> str:
 
 
 def missed(start: int, end: int, process: int = 1) -> str:
-    return f"INSERT INTO missed VALUES ({process}, {start}, {end})"
+    return f"INSERT INTO process_gap VALUES ({process}, {start}, {end})"
 
 
 def seen_until(end: int, process: int = 1) -> str:
@@ -397,7 +397,7 @@ def test_a_sender_whose_publications_on_the_topic_have_no_event_of_the_middlewar
         "INSERT INTO store.publication (publication_id, source_timestamp_ns) VALUES (1, 7);"
         f"INSERT INTO store.publisher (publisher_id, topic_name) VALUES (5, '{topic}');"
         "INSERT INTO store.publication (publisher_id, source_timestamp_ns) VALUES (5, 1);"
-        f"INSERT INTO unstamped VALUES (1, 5, {is_without_event})"
+        f"INSERT INTO unstamped_call VALUES (1, 5, {is_without_event})"
     )
     assert reason(con, TAKE, SENDER, RECORDED, published) == expected
 
@@ -469,7 +469,7 @@ def test_who_was_created_later_on_its_own_clock(con: duckdb.DuckDBPyConnection) 
 @pytest.mark.parametrize(
     "statement",
     [
-        "INSERT INTO rival VALUES (1)",
+        "INSERT INTO take_candidate VALUES (1)",
         "INSERT INTO store.nearest_message (publication_id) VALUES (NULL)",
     ],
 )

@@ -9,26 +9,21 @@ import pytest
 from rules import derived
 
 # Process 1 is in trace 1, which lasts from 100 to 900.
+TABLES = {
+    "derive.recording": "run_id = 1, trace_id, recording_id",
+    "store.trace": "trace_id, domain, start_ns = 100, end_ns = 900",
+    "store.process": "process_id = 1, first_seen_ns",
+    "store.publication": "run_id = 1, process_id = 1, trace_id = 1, start_ns, end_ns",
+    "store.take": "run_id = 1, process_id = 1, trace_id = 1, taken_ns",
+    "store.callback_instance": "run_id = 1, process_id = 1, trace_id = 1, start_ns, end_ns",
+    "store.node": "run_id = 1, process_id = 1, created_ns",
+    "store.gap": "trace_id = 1, kind, start_ns, end_ns",
+    "store.executor_state": "run_id = 1, thread_id, start_ns",
+    "store.thread": "thread_id, process_id = 1",
+}
 STAGE = """
-CREATE SCHEMA derive;
-CREATE SCHEMA store;
-CREATE TABLE derive.recording (run_id BIGINT DEFAULT 1, trace_id BIGINT, recording_id BIGINT);
-CREATE TABLE store.trace (trace_id BIGINT, domain VARCHAR, start_ns BIGINT DEFAULT 100,
-    end_ns BIGINT DEFAULT 900);
-CREATE TABLE store.process (process_id BIGINT DEFAULT 1, first_seen_ns BIGINT);
-CREATE TABLE store.publication (run_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT 1,
-    trace_id BIGINT DEFAULT 1, start_ns BIGINT, end_ns BIGINT);
-CREATE TABLE store.take (run_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT 1,
-    trace_id BIGINT DEFAULT 1, taken_ns BIGINT);
-CREATE TABLE store.callback_instance (run_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT 1,
-    trace_id BIGINT DEFAULT 1, start_ns BIGINT, end_ns BIGINT);
-CREATE TABLE store.node (run_id BIGINT DEFAULT 1, process_id BIGINT DEFAULT 1, created_ns BIGINT);
 CREATE TABLE store.publisher AS FROM store.node;
 CREATE TABLE store.subscription AS FROM store.node;
-CREATE TABLE store.gap (trace_id BIGINT DEFAULT 1, kind VARCHAR, start_ns BIGINT,
-    end_ns BIGINT);
-CREATE TABLE store.executor_state (run_id BIGINT DEFAULT 1, thread_id BIGINT, start_ns BIGINT);
-CREATE TABLE store.thread (thread_id BIGINT, process_id BIGINT DEFAULT 1);
 INSERT INTO derive.recording (trace_id, recording_id) VALUES (1, 1);
 INSERT INTO store.trace (trace_id) VALUES (1);
 """
@@ -46,7 +41,7 @@ LATER = "INSERT INTO store.callback_instance (trace_id, start_ns, end_ns) VALUES
 
 @pytest.fixture
 def con() -> Iterator[duckdb.DuckDBPyConnection]:
-    with derived(STAGE, RULES) as connection:
+    with derived(STAGE, RULES, TABLES) as connection:
         yield connection
 
 
@@ -238,8 +233,6 @@ def test_what_began_in_the_recording_can_only_be_lost(
 
 
 COPIES = """
-CREATE SCHEMA derive;
-CREATE SCHEMA store;
 CREATE TABLE store.link_transport AS FROM (VALUES (1, 1, 1, true), (1, 1, 1, true),
     (1, 2, 1, false), (1, 3, 2, true), (1, 4, 1, NULL))
     AS l (run_id, publisher_id, subscription_id, is_copy);

@@ -10,22 +10,19 @@ import pytest
 from rules import derived
 from thorough import few
 
+TABLES = {
+    "store.annotation": "run_id = 1, annotation_id = 1, kind = 'queue', queue_depth",
+    "store.annotation_input": "annotation_id = 1, subscription_id = 1",
+    "store.subscription": "subscription_id = 1, created_ns = 0",
+    "store.thread_break": "run_id = 1, thread_id, resumed_event_id",
+}
 STAGE = """
-CREATE SCHEMA derive;
-CREATE SCHEMA store;
 CREATE TABLE annotated (run_id BIGINT DEFAULT 1, annotation_id BIGINT DEFAULT 1,
     kind VARCHAR DEFAULT 'queue', publication_id BIGINT, publisher_id BIGINT DEFAULT 1,
     trace_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 2, start_ns BIGINT, start_event_id BIGINT,
     subscription_id BIGINT);
 CREATE TABLE run (subscription_id BIGINT DEFAULT 1, callback_instance_id BIGINT,
     thread_id BIGINT DEFAULT 1, start_event_id BIGINT);
-CREATE TABLE store.annotation (run_id BIGINT DEFAULT 1, annotation_id BIGINT DEFAULT 1,
-    kind VARCHAR DEFAULT 'queue', queue_depth BIGINT);
-CREATE TABLE store.annotation_input (annotation_id BIGINT DEFAULT 1,
-    subscription_id BIGINT DEFAULT 1);
-CREATE TABLE store.subscription (subscription_id BIGINT DEFAULT 1, created_ns BIGINT DEFAULT 0);
-CREATE TABLE store.thread_break (run_id BIGINT DEFAULT 1, thread_id BIGINT,
-    resumed_event_id BIGINT);
 INSERT INTO store.annotation_input DEFAULT VALUES;
 INSERT INTO store.subscription DEFAULT VALUES;
 """
@@ -37,7 +34,7 @@ FROM derive.link_causal_queue(1, 'annotated', 'run') ORDER BY ALL
 
 @pytest.fixture
 def rules() -> Iterator[duckdb.DuckDBPyConnection]:
-    with derived(STAGE, ("link_causal_queue",)) as con:
+    with derived(STAGE, ("link_causal_queue",), TABLES) as con:
         yield con
 
 

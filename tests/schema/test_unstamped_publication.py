@@ -6,8 +6,6 @@ import pytest
 from rules import derived
 
 STAGE = """
-CREATE SCHEMA store;
-CREATE SCHEMA derive;
 CREATE TABLE store.host AS SELECT 1 AS host_id, 1 AS clock_id;
 CREATE TABLE store.process AS SELECT 1 AS process_id, 1 AS host_id;
 CREATE TABLE store.publisher AS SELECT 1 AS publisher_id, '/a' AS topic_name;
