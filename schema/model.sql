@@ -1,5 +1,5 @@
 -- The tables of the model. `python docs/generate.py` writes this from `schema/alignment`,
--- `schema/model` and `schema/kernel`; do not edit.
+-- `schema/model`, `schema/kernel` and `schema/arrival`; do not edit.
 -- An ingest makes those with it that cannot have a row in a recording.
 
 CREATE TABLE staging.agnocast_entry (publication_id BIGINT, take_id BIGINT, entry_id BIGINT,

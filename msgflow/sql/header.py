@@ -114,6 +114,7 @@ SCHEMAS = {
     "alignment": "staging",
     "model": "staging",
     "kernel": "staging",
+    "arrival": "staging",
     "overlap": "overlap",
     "link": "derive",
     "clock": "derive",

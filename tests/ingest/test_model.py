@@ -208,7 +208,7 @@ def wrongly_left_out(source: Path | StagedEvents) -> list[str]:
         return [
             header.name
             for header in SOMETIMES_EMPTY
-            if header.name not in empty and not model.may_have_rows(con, header, empty)
+            if header.name not in empty and not model.may_have_rows(con, header.sources, empty)
         ]
 
 
