@@ -97,7 +97,7 @@ _DEFAULT = r"(?: += +(?P<default>'(?:[^']|'')*'|\[[^\]]*\]|[^'\s\[]\S*))?"
 _PARAM = re.compile(rf"{_NAME} +{_TYPE}{_CHOICES}{_DEFAULT}(?P<gap> +)(?P<description>\S.*)")
 _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<description>\S.*)")
 _STEP = re.compile(
-    r"(?:-- when: (?P<when>[^\n]*)\n-- columns: (?P<columns>[^\n]*)\n|--[^\n]*\n)*"
+    r"(?:-- when: (?P<when>.*?)\n-- columns: (?P<columns>[^\n]*(?:\n-- {4,}[^\n]*)*)\n|--[^\n]*\n)*?"
     r"CREATE OR REPLACE TEMP TABLE (?P<table>[a-z_]+) AS\n.*?;\n+",
     re.DOTALL,
 )
@@ -339,10 +339,14 @@ def _split(text: str, path: Path) -> tuple[list[_Field], str]:
 def _steps(body: str) -> tuple[tuple[Step, ...], str]:
     steps: list[Step] = []
     while match := _STEP.match(body):
-        sources, columns = _sources(match["when"] or ""), match["columns"] or ""
+        sources, columns = _sources(_joined(match["when"])), _joined(match["columns"])
         steps.append(Step(match["table"], match[0].rstrip(), sources, columns))
         body = body[match.end() :]
     return tuple(steps), body
+
+
+def _joined(value: str | None) -> str:
+    return re.sub(r"\n-- +", " ", value or "")
 
 
 def _code(text: str) -> str:

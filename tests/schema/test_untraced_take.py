@@ -13,14 +13,14 @@ from rules import modelled
 STAGE = """
 CREATE SCHEMA staging;
 CREATE SCHEMA raw;
-CREATE TABLE staging.callback_owner_announced AS
+CREATE TEMP TABLE callback_announced AS
     SELECT 1 AS process_id, unnest([7, 6]) AS callback_handle, NULL::INTEGER AS callback_event_id,
         unnest([70, 60]) AS handle, NULL::VARCHAR AS kind, unnest([100, 900]) AS start_event_id,
         NULL::INTEGER AS owner_event_id, false AS is_disputed, true AS has_takes,
         true AS has_executions, true AS has_requests;
 CREATE TABLE staging.callback_known (event_id INTEGER, process_id INTEGER, callback_handle INTEGER,
     kind VARCHAR, service_event_id INTEGER, service_handle INTEGER);
-CREATE TABLE staging.callback_owner_trigger AS
+CREATE TEMP TABLE callback_trigger AS
     SELECT 100 AS start_event_id, 1 AS process_id, 1 AS thread_id, 7 AS callback_handle,
         NULL::INTEGER AS callback_event_id;
 CREATE TABLE staging.callback_run (start_event_id INTEGER, callback_handle INTEGER,
@@ -39,7 +39,7 @@ CREATE MACRO staging.located(tracepoint) AS TABLE FROM waited;
 """
 NO_WAIT = "DELETE FROM waited"
 NO_TAKE = "UPDATE staging.callback_binding SET take_event_id = NULL WHERE start_event_id = 200"
-ANNOUNCED = "UPDATE staging.callback_owner_announced SET"
+ANNOUNCED = "UPDATE callback_announced SET"
 SERVED = "UPDATE staging.callback_run SET"
 
 
@@ -109,7 +109,7 @@ def staged() -> Iterator[duckdb.DuckDBPyConnection]:
             [
                 NO_TAKE,
                 f"{SERVED} previous_event_id = 150 WHERE start_event_id = 200",
-                "DELETE FROM staging.callback_owner_trigger",
+                "DELETE FROM callback_trigger",
             ],
             False,
         ),

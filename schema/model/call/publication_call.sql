@@ -5,8 +5,54 @@
 --     replay of a transient-local buffer, not a call.
 -- grain: one row per publish() call
 -- when: raw.ros2_rclcpp_publish, raw.ros2_rcl_publish, raw.ros2_rmw_publish,
---     staging.middleware_write, raw.ros2_caret_dds_write, raw.ros2_caret_dds_bind_addr_to_stamp,
---     raw.ros2_rclcpp_intra_publish
+--     raw.dds_write, raw.dds_write_pre, raw.ros2_caret_dds_write,
+--     raw.ros2_caret_dds_bind_addr_to_stamp, raw.ros2_rclcpp_intra_publish
+
+-- What instrumented middleware says of one write: begin and end, in either order, or only one.
+-- when: raw.dds_write, raw.dds_write_pre
+-- columns: start_event_id BIGINT, end_event_id BIGINT, start_ns BIGINT, end_ns BIGINT,
+--     trace_index INTEGER, thread_index INTEGER, previous_event_id BIGINT,
+--     callback_event_id BIGINT, writer UBIGINT, message UBIGINT, dds_ns BIGINT, stamp BIGINT
+CREATE OR REPLACE TEMP TABLE middleware_write AS
+WITH write_begin AS (SELECT * FROM staging.call('dds_write_pre')),
+write_end AS (SELECT * FROM staging.call('dds_write')),
+pair AS (
+    SELECT b.event_id AS begin_event_id, e.event_id AS end_event_id
+    FROM write_begin AS b
+    JOIN write_end AS e ON b.event_id = e.previous_event_id AND b.writer = e.writer
+),
+reversed_pair AS (
+    SELECT b.event_id AS begin_event_id, e.event_id AS end_event_id
+    FROM write_end AS e
+    JOIN write_begin AS b ON e.event_id = b.previous_event_id AND e.writer = b.writer
+    WHERE e.event_id NOT IN (SELECT end_event_id FROM pair)
+        AND b.event_id NOT IN (SELECT begin_event_id FROM pair)
+),
+every_pair AS (
+    SELECT begin_event_id, end_event_id FROM pair
+    UNION ALL
+    SELECT begin_event_id, end_event_id FROM reversed_pair
+)
+SELECT
+    least(b.event_id, e.event_id) AS start_event_id,
+    greatest(b.event_id, e.event_id) AS end_event_id,
+    least(b.ts_ns, e.ts_ns) AS start_ns,
+    greatest(b.ts_ns, e.ts_ns) AS end_ns,
+    coalesce(b.trace_index, e.trace_index) AS trace_index,
+    coalesce(b.thread_index, e.thread_index) AS thread_index,
+    CASE
+        WHEN e.event_id < b.event_id THEN e.previous_event_id
+        ELSE coalesce(b.previous_event_id, e.previous_event_id)
+    END AS previous_event_id,
+    coalesce(b.previous_callback_event_id, e.previous_callback_event_id) AS callback_event_id,
+    coalesce(b.writer, e.writer) AS writer,
+    coalesce(b.data, e.data) AS message,
+    e.ts_ns AS dds_ns,
+    nullif(e.timestamp, 0)::BIGINT AS stamp
+FROM write_begin AS b
+LEFT JOIN every_pair AS p ON b.event_id = p.begin_event_id
+FULL JOIN write_end AS e ON p.end_event_id = e.event_id;
+
 WITH client AS (
     SELECT
         coalesce(u.event_id, r.event_id) AS start_event_id,
@@ -55,7 +101,7 @@ written AS (
         m.rclcpp_handle, m.rcl_handle, m.rmw_handle, w.writer,
         greatest(m.stamp, w.stamp) AS stamp
     FROM middleware AS m
-    FULL JOIN staging.middleware_write AS w
+    FULL JOIN middleware_write AS w
         ON m.end_event_id = w.previous_event_id
         AND m.message = w.message
         AND coalesce(m.rmw_ns, m.rcl_ns) IS NOT NULL
@@ -131,7 +177,7 @@ SELECT
     w.end_ns, w.intra_ns, w.rclcpp_ns, w.rcl_ns, w.rmw_ns, w.dds_ns, w.publisher_handle,
     w.rmw_handle, w.writer, w.stamp AS source_timestamp_ns, w.callback_event_id
 FROM complete AS w
-JOIN staging.context AS c
+JOIN staging.thread AS c
     ON w.thread_index = c.thread_index
     AND w.start_event_id >= c.from_event_id
     AND w.start_event_id < c.until_event_id

@@ -9,7 +9,40 @@
 -- grain: one row per successful take, or dequeue
 -- when: raw.ros2_rmw_take, raw.ros2_rcl_take, raw.ros2_rclcpp_take,
 --     raw.ros2_dispatch_subscription_callback, raw.ros2_rclcpp_ring_buffer_dequeue,
---     staging.agnocast_take
+--     raw.agnocast_agnocast_create_callable, raw.agnocast_agnocast_take
+
+-- Messages that Agnocast handed over, to a callback or to a poll. A poll without a message got
+-- nothing. `handle` tells subscriptions apart: the number of the callback, or the handle of the
+-- subscription that was polled.
+-- when: raw.agnocast_agnocast_create_callable, raw.agnocast_agnocast_take
+-- columns: event_id BIGINT, ts_ns BIGINT, trace_index INTEGER, thread_id BIGINT, process_id BIGINT,
+--     handle UBIGINT, subscription_event_id BIGINT
+CREATE OR REPLACE TEMP TABLE agnocast_take AS
+WITH called AS (
+    SELECT
+        event_id, ts_ns, trace_index, thread_id, process_id, entry_id,
+        pid_callback_info_id AS handle
+    FROM staging.located('agnocast_agnocast_create_callable')
+),
+callback AS (
+    SELECT subscription_event_id AS event_id, process_id, callback_handle AS handle
+    FROM staging.callback_known
+    WHERE kind = 'subscription'
+),
+polled AS (
+    SELECT
+        event_id, ts_ns, trace_index, thread_id, process_id, entry_id, subscription_handle AS handle
+    FROM staging.located('agnocast_agnocast_take')
+    WHERE message <> 0
+),
+subscription AS (
+    SELECT event_id, process_id, subscription_handle AS handle FROM staging.subscription_known
+)
+SELECT * RENAME (object_event_id AS subscription_event_id)
+FROM staging.with_latest('called', 'callback')
+UNION ALL
+SELECT * FROM staging.with_latest('polled', 'subscription');
+
 WITH middleware AS (
     SELECT
         coalesce(d.event_id, m.event_id) AS start_event_id,
@@ -60,7 +93,7 @@ located AS (
         h.start_event_id, h.end_event_id, h.trace_index, c.thread_id, c.process_id, h.rmw_ns,
         h.rcl_ns, h.caret_ns, h.rmw_handle, h.stamp
     FROM chain AS h
-    JOIN staging.context AS c
+    JOIN staging.thread AS c
         ON h.thread_index = c.thread_index
         AND h.start_event_id >= c.from_event_id
         AND h.start_event_id < c.until_event_id
@@ -116,4 +149,4 @@ UNION ALL
 SELECT
     event_id, event_id, trace_index, thread_id, process_id, ts_ns, 'agnocast', handle, NULL, NULL,
     subscription_event_id, subscription_event_id IS NOT NULL
-FROM staging.agnocast_take
+FROM agnocast_take

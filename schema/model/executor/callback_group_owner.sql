@@ -50,6 +50,7 @@ owned AS (
     GROUP BY a.event_id, a.process_id, a.callback_group_addr, a.group_type_name
 )
 SELECT
+    row_number() OVER (ORDER BY min(event_id)) AS callback_group_id,
     min(event_id) AS event_id,
     process_id, callback_group_addr, executor_event_id,
     arg_min(group_type_name, event_id) AS kind

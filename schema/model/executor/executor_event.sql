@@ -24,7 +24,7 @@ SELECT
     e.previous_executor_ts_ns AS previous_ns, e.previous_executor_label AS previous_kind,
     c.from_event_id
 FROM event AS e
-JOIN staging.context AS c
+JOIN staging.thread AS c
     ON e.thread_index = c.thread_index
     AND e.event_id >= c.from_event_id
     AND e.event_id < c.until_event_id

@@ -11,7 +11,7 @@ WITH waited AS (
 )
 SELECT c.thread_id, c.process_id, w.polls, w.waits
 FROM waited AS w
-JOIN staging.context AS c
+JOIN staging.thread AS c
     ON w.thread_index = c.thread_index
     AND w.event_id >= c.from_event_id
     AND w.event_id < c.until_event_id

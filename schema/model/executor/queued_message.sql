@@ -9,7 +9,7 @@ WITH enabled AS (
     SELECT trace_index FROM staging.declared WHERE name = 'ros2:rclcpp_executor_get_next_ready'
 ),
 began AS (
-    SELECT thread_id, min(start_ns) AS start_ns FROM staging.callback_pair GROUP BY thread_id
+    SELECT thread_id, min(start_ns) AS start_ns FROM staging.callback_run GROUP BY thread_id
 ),
 taken AS (
     SELECT
@@ -31,7 +31,7 @@ sent AS (
         ) AS next_ns
     FROM staging.publication_call AS c
     JOIN staging.process AS p ON c.process_id = p.process_id
-    ASOF LEFT JOIN staging.callback_pair AS r
+    ASOF LEFT JOIN staging.callback_run AS r
         ON c.thread_id = r.thread_id AND c.end_event_id < r.end_event_id
 )
 SELECT

@@ -83,7 +83,7 @@ SELECT
     n.event_id, c.thread_id, n.sequence, n.ts_ns, b.event_id IS NOT NULL AS is_between,
     b.event_id IS NOT NULL OR n.sequence = 'executor' AS is_behind
 FROM near AS n
-JOIN staging.context AS c
+JOIN staging.thread AS c
     ON n.thread_index = c.thread_index
     AND n.event_id >= c.from_event_id
     AND n.event_id < c.until_event_id

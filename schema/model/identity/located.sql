@@ -3,7 +3,7 @@
 CREATE OR REPLACE MACRO staging.located(tracepoint) AS TABLE
 SELECT e.*, c.thread_id, c.process_id
 FROM query_table('raw.' || tracepoint) AS e
-JOIN staging.context AS c
+JOIN staging.thread AS c
     ON e.thread_index = c.thread_index
     AND e.event_id >= c.from_event_id
     AND e.event_id < c.until_event_id

@@ -9,20 +9,15 @@ WITH every_subscription AS (
     FROM staging.subscription_known
     UNION ALL
     SELECT
-        min(n.start_event_id), n.process_id, NULL, NULL, n.rmw_handle, NULL, NULL, NULL, false,
-        true, false
-    FROM staging.take_number AS n
-    LEFT JOIN staging.take_inferred AS i ON n.start_event_id = i.start_event_id
-    WHERE n.rmw_handle IS NOT NULL
-        AND coalesce(
-            n.subscription_event_id, i.subscription_event_id, n.callback_subscription_event_id
-        ) IS NULL
-    GROUP BY n.process_id, n.rmw_handle
+        min(start_event_id), process_id, NULL, NULL, rmw_handle, NULL, NULL, NULL, false, true, false
+    FROM staging.take_number
+    WHERE subscription_event_id IS NULL AND rmw_handle IS NOT NULL
+    GROUP BY process_id, rmw_handle
     UNION ALL
     SELECT DISTINCT
         subscription_event_id, process_id, NULL, NULL, NULL::UBIGINT, NULL, NULL, NULL::BIGINT,
         false, true, false
-    FROM staging.take_inferred
+    FROM staging.take_number
     WHERE is_inferred
 )
 SELECT

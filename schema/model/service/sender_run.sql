@@ -14,8 +14,7 @@ run AS (
     FROM staging.callback_run AS r
     SEMI JOIN send AS s ON r.thread_id = s.thread_id
     JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
-    LEFT JOIN staging.callback_nesting AS p ON r.start_event_id = p.start_event_id
-    LEFT JOIN staging.callback_number AS o ON p.parent_event_id = o.start_event_id
+    LEFT JOIN staging.callback_number AS o ON r.parent_event_id = o.start_event_id
 ),
 nesting AS (SELECT DISTINCT thread_id FROM run WHERE parent_id IS NOT NULL),
 -- Whose instance goes on after each event; where one ends at the begin of another, the other.
@@ -50,5 +49,5 @@ sent AS (
 SELECT s.event_id, coalesce(f.callback_instance_id, s.callback_instance_id) AS callback_instance_id
 FROM sent AS s
 LEFT JOIN staging.callback_number AS n ON s.callback_instance_id = n.callback_instance_id
-LEFT JOIN staging.callback_step AS p ON n.start_event_id = p.start_event_id
+LEFT JOIN staging.callback_binding AS p ON n.start_event_id = p.start_event_id
 LEFT JOIN staging.callback_number AS f ON p.call_event_id = f.start_event_id

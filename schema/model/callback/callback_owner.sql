@@ -5,8 +5,100 @@
 --     requests that services take were not enabled. The owner is a placeholder where this was
 --     decided by elimination, or where the service was not seen to be initialised.
 -- grain: one row per callback whose owner is decided
--- when: staging.callback_owner_announced,
+-- when: staging.callback_binding WHERE coalesce(kind = 'unknown', true),
 --     staging.callback_known WHERE kind = 'service' AND service_event_id IS NULL
+
+-- Executor events directly before instances of such callbacks. The executor names the handle that
+-- it executes, if that is a timer or a subscription. Else it only looks for what is ready. Where
+-- another event comes in between, it is neither.
+CREATE OR REPLACE TEMP TABLE callback_trigger AS
+WITH unowned AS (
+    SELECT start_event_id, process_id, callback_handle, callback_event_id, is_intra_process,
+        take_event_id, request_event_id
+    FROM staging.callback_binding
+    WHERE coalesce(kind = 'unknown', true)
+),
+explained AS (
+    SELECT DISTINCT process_id, callback_handle, callback_event_id
+    FROM unowned
+    WHERE is_intra_process OR take_event_id IS NOT NULL OR request_event_id IS NOT NULL
+),
+run AS (
+    SELECT
+        u.start_event_id, u.process_id, u.callback_handle, u.callback_event_id, p.trace_index,
+        p.thread_id, p.executor_event_id,
+        coalesce(p.previous_event_id < p.executor_event_id, true) AS is_direct
+    FROM unowned AS u
+    ANTI JOIN explained AS e
+        ON u.process_id = e.process_id
+        AND u.callback_handle = e.callback_handle
+        AND u.callback_event_id IS NOT DISTINCT FROM e.callback_event_id
+    JOIN staging.callback_run AS p ON u.start_event_id = p.start_event_id
+    WHERE p.executor_event_id IS NOT NULL
+),
+named AS (
+    SELECT r.start_event_id, x.handle
+    FROM run AS r
+    JOIN raw.ros2_rclcpp_executor_execute AS x ON r.executor_event_id = x.event_id
+    WHERE r.is_direct
+),
+ready AS (
+    SELECT r.start_event_id
+    FROM run AS r
+    JOIN raw.ros2_rclcpp_executor_get_next_ready AS x ON r.executor_event_id = x.event_id
+    WHERE r.is_direct
+)
+SELECT
+    r.start_event_id, r.process_id, r.callback_handle, r.callback_event_id, r.trace_index,
+    r.thread_id, n.handle, y.start_event_id IS NOT NULL AS is_ready
+FROM run AS r
+LEFT JOIN named AS n ON r.start_event_id = n.start_event_id
+LEFT JOIN ready AS y ON r.start_event_id = y.start_event_id;
+
+-- If the executor said the same before each instance of a callback: the handle that it named (NULL
+-- if it named none), the timer or subscription of that handle if the trace has it, and which
+-- tracepoints were enabled meanwhile.
+CREATE OR REPLACE TEMP TABLE callback_announced AS
+WITH enabled AS (
+    SELECT
+        trace_index,
+        bool_or(name IN ('ros2:rmw_take', 'ros2:rcl_take')) AS has_takes,
+        bool_or(name = 'ros2:rclcpp_executor_execute') AS has_executions,
+        bool_or(name = 'ros2:rmw_take_request') AS has_requests
+    FROM staging.declared
+    GROUP BY trace_index
+),
+agreed AS (
+    SELECT
+        t.process_id, t.callback_handle, t.callback_event_id, any_value(t.handle) AS handle,
+        min(t.start_event_id) AS start_event_id, bool_and(e.has_takes) AS has_takes,
+        bool_and(e.has_executions) AS has_executions, bool_or(e.has_requests) AS has_requests
+    FROM callback_trigger AS t
+    LEFT JOIN enabled AS e ON t.trace_index = e.trace_index
+    GROUP BY t.process_id, t.callback_handle, t.callback_event_id
+    HAVING sum(t.is_ready::INTEGER) = count(*)
+        OR (count(t.handle) = count(*) AND count(DISTINCT t.handle) = 1)
+),
+owner AS (
+    SELECT event_id, process_id, timer_handle AS handle, 'timer' AS kind, event_id AS owner_event_id
+    FROM staging.located('ros2_rcl_timer_init')
+    UNION ALL
+    SELECT event_id, process_id, subscription_handle, 'subscription', event_id
+    FROM staging.subscription_known
+    UNION ALL
+    SELECT 0, process_id, any_value(timer_handle), 'timer', timer_event_id
+    FROM staging.timer_use
+    WHERE is_inferred
+    GROUP BY process_id, timer_event_id
+)
+SELECT
+    a.process_id, a.callback_handle, a.callback_event_id, a.handle, a.start_event_id,
+    a.has_takes, a.has_executions, a.has_requests, o.kind, o.owner_event_id,
+    a.handle IS NOT NULL
+    AND count(*) OVER (PARTITION BY a.process_id, a.handle, o.owner_event_id) > 1 AS is_disputed
+FROM agreed AS a
+ASOF LEFT JOIN owner AS o
+    ON a.process_id = o.process_id AND a.handle = o.handle AND a.start_event_id >= o.event_id;
 
 -- Messages may reach callbacks although no take is traced, as loaned messages do. Processes show
 -- that (`untraced_take`) if a subscription ran so, or if what would have to be a timer ran after a
@@ -14,8 +106,8 @@
 -- its wait first, if it has one thread.
 WITH candidate AS (
     SELECT t.start_event_id, t.process_id, t.thread_id
-    FROM staging.callback_owner_trigger AS t
-    JOIN staging.callback_owner_announced AS a
+    FROM callback_trigger AS t
+    JOIN callback_announced AS a
         ON t.process_id = a.process_id
         AND t.callback_handle = a.callback_handle
         AND t.callback_event_id IS NOT DISTINCT FROM a.callback_event_id
@@ -39,7 +131,7 @@ subscription_without_take AS (
         AND NOT r.is_intra_process
         AND coalesce(r.previous_event_id < r.executor_event_id, true)
     UNION ALL
-    SELECT process_id FROM staging.callback_owner_announced WHERE kind = 'subscription'
+    SELECT process_id FROM callback_announced WHERE kind = 'subscription'
 ),
 several_threads AS (
     SELECT DISTINCT r.thread_id
@@ -100,7 +192,7 @@ decided AS (
             WHEN a.handle IS NULL AND a.has_executions AND NOT a.has_requests THEN 'service'
             WHEN a.handle IS NOT NULL AND a.has_takes AND u.process_id IS NULL THEN 'timer'
         END AS kind
-    FROM staging.callback_owner_announced AS a
+    FROM callback_announced AS a
     LEFT JOIN untraced_take AS u ON a.process_id = u.process_id
 ),
 asked AS (
