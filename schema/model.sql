@@ -139,8 +139,8 @@ CREATE TABLE staging.publication_call (start_event_id BIGINT, end_event_id BIGIN
     publisher_handle UBIGINT, rmw_handle UBIGINT, writer UBIGINT, source_timestamp_ns BIGINT,
     callback_event_id BIGINT);
 CREATE TABLE staging.publication_next (start_event_id BIGINT, next_event_ns BIGINT);
-CREATE TABLE staging.publication_number (start_event_id BIGINT, process_id BIGINT,
-    unknown_handle UBIGINT, publisher_event_id BIGINT, is_rosout BOOLEAN, publication_id BIGINT);
+CREATE TABLE staging.publication_number (start_event_id BIGINT, publisher_event_id BIGINT,
+    is_rosout BOOLEAN, process_id BIGINT, unknown_handle UBIGINT, publication_id BIGINT);
 CREATE TABLE staging.publisher (publisher_id BIGINT, process_id BIGINT, node_id BIGINT,
     topic_name VARCHAR, publisher_handle UBIGINT, rmw_handle UBIGINT, gid BLOB, queue_depth BIGINT,
     created_ns BIGINT, is_internal BOOLEAN, is_inferred BOOLEAN, is_topic_learned BOOLEAN,
@@ -207,8 +207,8 @@ CREATE TABLE staging.subscription_known (event_id BIGINT, process_id BIGINT, thr
 CREATE TABLE staging.subscription_object (event_id BIGINT, subscription_event_id BIGINT);
 CREATE TABLE staging.take_chain (start_event_id BIGINT, end_event_id BIGINT, trace_index INTEGER,
     thread_id BIGINT, process_id BIGINT, taken_ns BIGINT, method VARCHAR, rmw_handle UBIGINT,
-    buffer_handle UBIGINT, source_timestamp_ns BIGINT, subscription_event_id BIGINT,
-    is_known BOOLEAN);
+    source_timestamp_ns BIGINT, subscription_event_id BIGINT, is_known BOOLEAN,
+    buffer_handle UBIGINT);
 CREATE TABLE staging.take_number (start_event_id BIGINT, process_id BIGINT, rmw_handle UBIGINT,
     callback_start_event_id BIGINT, subscription_event_id BIGINT, is_inferred BOOLEAN,
     take_id BIGINT);
