@@ -80,12 +80,10 @@ CREATE TABLE staging.exchange (is_request BOOLEAN, event_at_client BIGINT, event
 CREATE TABLE staging.executor (executor_id BIGINT, process_id BIGINT, kind VARCHAR,
     is_inferred BOOLEAN, thread_ids BIGINT[], executor_event_id BIGINT);
 CREATE TABLE staging.executor_callback (executor_event_id BIGINT, callback_instance_id BIGINT);
-CREATE TABLE staging.executor_first (thread_id BIGINT, event_id BIGINT, is_undelimited BOOLEAN);
-CREATE TABLE staging.executor_in_order (thread_id BIGINT);
+CREATE TABLE staging.executor_first (thread_id BIGINT, event_id BIGINT, waits BIGINT, polls BIGINT,
+    is_undelimited BOOLEAN);
 CREATE TABLE staging.executor_named (event_id BIGINT, process_id BIGINT, executor_addr UBIGINT,
     kind VARCHAR);
-CREATE TABLE staging.executor_polled (thread_id BIGINT, process_id BIGINT, polls BIGINT,
-    waits BIGINT);
 CREATE TABLE staging.executor_thread (executor_id BIGINT, thread_id BIGINT);
 CREATE TABLE staging.failed_take (trace_id INTEGER, subscription_id BIGINT, process_id BIGINT,
     thread_id BIGINT, failed_ns BIGINT);
@@ -104,7 +102,6 @@ CREATE TABLE staging.link_packet (sent_trace_id INTEGER, received_trace_id INTEG
 CREATE TABLE staging.link_request (request_id BIGINT, callback_instance_id BIGINT);
 CREATE TABLE staging.link_response (response_id BIGINT, callback_instance_id BIGINT);
 CREATE TABLE staging.loss_affected (kind VARCHAR, start_event_id BIGINT);
-CREATE TABLE staging.middleware_waking (process_id BIGINT, waker_thread_id BIGINT, at_ns BIGINT);
 CREATE TABLE staging.near_gap (event_id BIGINT, thread_id BIGINT, sequence VARCHAR, ts_ns BIGINT,
     is_between BOOLEAN, is_behind BOOLEAN);
 CREATE TABLE staging.network_packet (event_id BIGINT, trace_id INTEGER, clock_id BIGINT,
@@ -153,7 +150,7 @@ CREATE TABLE staging.python_mark (event_id BIGINT, ts_ns BIGINT, thread_id BIGIN
     previous_callback_event_id BIGINT, previous_executor_event_id BIGINT);
 CREATE TABLE staging.queued_message (start_event_id BIGINT, take_id BIGINT, subscription_id BIGINT,
     thread_id BIGINT, process_id BIGINT, taken_ns BIGINT, publishing_thread_id BIGINT,
-    published_ns BIGINT, end_ns BIGINT, next_ns BIGINT);
+    published_ns BIGINT, end_ns BIGINT, next_ns BIGINT, is_in_order BOOLEAN);
 CREATE TABLE staging.request (request_id BIGINT, client_id BIGINT, service_id BIGINT,
     sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT, sender_thread_id BIGINT,
     receiver_thread_id BIGINT, callback_instance_id BIGINT, send_event_id BIGINT,

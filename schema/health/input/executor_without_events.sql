@@ -21,7 +21,7 @@ silent AS (
     SEMI JOIN enabled AS e ON p.trace_index = e.trace_index
     ANTI JOIN staging.executor_first AS x ON p.thread_id = x.thread_id
     ANTI JOIN staging.thread_break AS b ON p.thread_id = b.thread_id
-    ANTI JOIN staging.executor_in_order AS o ON p.thread_id = o.thread_id
+    ANTI JOIN (FROM staging.queued_message WHERE is_in_order) AS o ON p.thread_id = o.thread_id
     -- Of these the recording left the events out.
     ANTI JOIN (SELECT process_id FROM staging.executor_named WHERE kind IN (
         'single_threaded_executor', 'multi_threaded_executor'

@@ -7,13 +7,13 @@
 
 CREATE OR REPLACE TEMP TABLE annotation_event AS
 SELECT event_id, process_id, 'periodic_async' AS kind, subs AS inputs, pubs AS outputs
-FROM staging.located('ros2_message_link_periodic_async')
+FROM staging.located('raw.ros2_message_link_periodic_async')
 UNION ALL
 SELECT event_id, process_id, 'partial_sync', subs, pubs
-FROM staging.located('ros2_message_link_partial_sync')
+FROM staging.located('raw.ros2_message_link_partial_sync')
 UNION ALL
 SELECT event_id, process_id, 'approximate_sync', subs, pubs
-FROM staging.located('ros2_message_link_approximate_sync');
+FROM staging.located('raw.ros2_message_link_approximate_sync');
 
 WITH input AS (
     SELECT DISTINCT event_id, process_id, unnest(inputs) AS handle FROM annotation_event
@@ -32,11 +32,11 @@ input_by_handle AS (
 input_by_callback AS (
     SELECT i.event_id, i.handle, c.subscription_id
     FROM input_by_handle AS i
-    ASOF JOIN staging.located('ros2_rclcpp_subscription_init') AS o
+    ASOF JOIN staging.located('raw.ros2_rclcpp_subscription_init') AS o
         ON i.process_id = o.process_id
         AND i.handle = o.subscription_handle
         AND i.event_id >= o.event_id
-    ASOF JOIN staging.located('ros2_rclcpp_subscription_callback_added') AS a
+    ASOF JOIN staging.located('raw.ros2_rclcpp_subscription_callback_added') AS a
         ON o.process_id = a.process_id
         AND o.subscription = a.subscription
         AND i.event_id >= a.event_id

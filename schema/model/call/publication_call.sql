@@ -128,7 +128,7 @@ intra AS (
 ),
 complete AS (
     SELECT
-        coalesce(i.start_event_id, x.start_event_id) AS start_event_id,
+        coalesce(i.start_event_id, x.start_event_id) AS event_id,
         coalesce(x.end_event_id, i.end_event_id) AS end_event_id,
         coalesce(i.start_ns, x.start_ns) AS start_ns,
         coalesce(x.end_ns, i.end_ns) AS end_ns,
@@ -143,11 +143,7 @@ complete AS (
         ON x.intra_event_id = i.start_event_id AND x.rcl_handle = i.publisher_handle
 )
 SELECT
-    w.start_event_id, w.end_event_id, w.trace_index, c.thread_id, c.process_id, w.start_ns,
-    w.end_ns, w.intra_ns, w.rclcpp_ns, w.rcl_ns, w.rmw_ns, w.dds_ns, w.publisher_handle,
-    w.rmw_handle, w.writer, w.stamp AS source_timestamp_ns, w.callback_event_id
-FROM complete AS w
-JOIN staging.thread AS c
-    ON w.thread_index = c.thread_index
-    AND w.start_event_id >= c.from_event_id
-    AND w.start_event_id < c.until_event_id
+    event_id AS start_event_id, end_event_id, trace_index, thread_id, process_id, start_ns, end_ns,
+    intra_ns, rclcpp_ns, rcl_ns, rmw_ns, dds_ns, publisher_handle, rmw_handle, writer,
+    stamp AS source_timestamp_ns, callback_event_id
+FROM staging.located('complete')

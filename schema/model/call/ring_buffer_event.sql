@@ -6,7 +6,7 @@
 --     raw.ros2_rclcpp_ring_buffer_dequeue, raw.ros2_rclcpp_ring_buffer_enqueue
 WITH enqueue AS (
     SELECT event_id, ts_ns, trace_index, process_id, thread_id, buffer, "index" AS slot, overwritten
-    FROM staging.located('ros2_rclcpp_ring_buffer_enqueue')
+    FROM staging.located('raw.ros2_rclcpp_ring_buffer_enqueue')
 ),
 published AS (
     SELECT e.event_id, b.publication_id
@@ -30,12 +30,12 @@ UNION ALL
 SELECT
     d.trace_index + 1, d.process_id, 'dequeue', d.buffer, d."index", d.ts_ns, NULL, t.take_id,
     false, d.event_id
-FROM staging.located('ros2_rclcpp_ring_buffer_dequeue') AS d
+FROM staging.located('raw.ros2_rclcpp_ring_buffer_dequeue') AS d
 LEFT JOIN staging.take_number AS t ON d.event_id = t.start_event_id
 UNION ALL
 SELECT trace_index + 1, process_id, 'clear', buffer, NULL, ts_ns, NULL, NULL, false, event_id
-FROM staging.located('ros2_rclcpp_ring_buffer_clear')
+FROM staging.located('raw.ros2_rclcpp_ring_buffer_clear')
 UNION ALL
 SELECT trace_index + 1, process_id, 'clear', buffer, NULL, ts_ns, NULL, NULL, false, event_id
-FROM staging.located('ros2_rclcpp_construct_ring_buffer')
+FROM staging.located('raw.ros2_rclcpp_construct_ring_buffer')
 ORDER BY event_id

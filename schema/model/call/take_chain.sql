@@ -20,8 +20,8 @@
 CREATE OR REPLACE TEMP TABLE ring_buffer_take AS
 WITH buffer AS (
     SELECT b.event_id, b.process_id, b.buffer, o.subscription_event_id
-    FROM staging.located('ros2_rclcpp_buffer_to_ipb') AS b
-    ASOF JOIN staging.located('ros2_rclcpp_ipb_to_subscription') AS i
+    FROM staging.located('raw.ros2_rclcpp_buffer_to_ipb') AS b
+    ASOF JOIN staging.located('raw.ros2_rclcpp_ipb_to_subscription') AS i
         ON b.process_id = i.process_id AND b.ipb = i.ipb AND b.event_id <= i.event_id
     JOIN staging.subscription_object AS o ON i.event_id = o.event_id
 )
@@ -31,7 +31,7 @@ SELECT
     'ring_buffer' AS method,
     d.buffer AS buffer_handle, b.subscription_event_id,
     b.event_id IS NOT NULL AS is_known
-FROM staging.located('ros2_rclcpp_ring_buffer_dequeue') AS d
+FROM staging.located('raw.ros2_rclcpp_ring_buffer_dequeue') AS d
 ASOF LEFT JOIN buffer AS b
     ON d.process_id = b.process_id AND d.buffer = b.buffer AND d.event_id >= b.event_id;
 
@@ -46,7 +46,7 @@ WITH called AS (
     SELECT
         event_id, ts_ns, trace_index, thread_id, process_id, entry_id,
         pid_callback_info_id AS handle
-    FROM staging.located('agnocast_agnocast_create_callable')
+    FROM staging.located('raw.agnocast_agnocast_create_callable')
 ),
 callback AS (
     SELECT subscription_event_id AS event_id, process_id, callback_handle AS handle
@@ -56,7 +56,7 @@ callback AS (
 polled AS (
     SELECT
         event_id, ts_ns, trace_index, thread_id, process_id, entry_id, subscription_handle AS handle
-    FROM staging.located('agnocast_agnocast_take')
+    FROM staging.located('raw.agnocast_agnocast_take')
     WHERE message <> 0
 ),
 subscription AS (
@@ -88,10 +88,9 @@ WITH layer AS (
 chain AS (
     SELECT
         thread_index,
-        min(event_id) AS start_event_id,
+        min(event_id) AS event_id,
         max(event_id) AS end_event_id,
         arg_min(trace_index, event_id) AS trace_index,
-        any_value(taken) AS taken,
         any_value(ts_ns) FILTER (layer = 'rmw') AS rmw_ns,
         any_value(ts_ns) FILTER (layer = 'rcl') AS rcl_ns,
         any_value(ts_ns) FILTER (layer = 'caret') AS caret_ns,
@@ -99,19 +98,9 @@ chain AS (
         arg_min(nullif(stamp, 0)::BIGINT, event_id) AS stamp
     FROM staging.call('layer')
     GROUP BY thread_index, call_number
-    HAVING bool_or(layer <> 'dds')
+    HAVING bool_or(layer <> 'dds') AND any_value(taken) IS DISTINCT FROM 0
 ),
-located AS (
-    SELECT
-        h.start_event_id, h.end_event_id, h.trace_index, c.thread_id, c.process_id, h.rmw_ns,
-        h.rcl_ns, h.caret_ns, h.rmw_handle, h.stamp
-    FROM chain AS h
-    JOIN staging.thread AS c
-        ON h.thread_index = c.thread_index
-        AND h.start_event_id >= c.from_event_id
-        AND h.start_event_id < c.until_event_id
-    WHERE h.taken IS DISTINCT FROM 0
-),
+located AS (FROM staging.located('chain')),
 rcl_reader AS (SELECT DISTINCT process_id, rmw_handle FROM located WHERE rcl_ns IS NOT NULL),
 known_reader AS (
     SELECT process_id, rmw_handle FROM staging.subscription_known
@@ -121,7 +110,7 @@ known_reader AS (
 rcl_traced AS (SELECT DISTINCT process_id FROM rcl_reader),
 taken AS (
     SELECT
-        t.start_event_id AS event_id, t.end_event_id, t.trace_index, t.thread_id, t.process_id,
+        t.event_id, t.end_event_id, t.trace_index, t.thread_id, t.process_id,
         coalesce(t.rmw_ns, t.rcl_ns, t.caret_ns) AS taken_ns,
         CASE WHEN t.rmw_ns IS NULL AND t.rcl_ns IS NULL THEN 'caret' ELSE 'rmw' END AS method,
         t.rmw_handle AS handle, t.stamp

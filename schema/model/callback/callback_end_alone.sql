@@ -3,13 +3,9 @@
 -- grain: one row per callback_end without a callback_start
 -- when: raw.ros2_callback_end
 WITH alone AS (
-    SELECT e.event_id, e.trace_index, c.thread_id
-    FROM raw.ros2_callback_end AS e
+    SELECT e.event_id, e.trace_index, e.thread_id
+    FROM staging.located('raw.ros2_callback_end') AS e
     ANTI JOIN staging.callback_run AS r ON e.event_id = r.end_event_id
-    JOIN staging.thread AS c
-        ON e.thread_index = c.thread_index
-        AND e.event_id >= c.from_event_id
-        AND e.event_id < c.until_event_id
 ),
 paired AS (
     SELECT thread_id, unnest([start_event_id, end_event_id]) AS event_id

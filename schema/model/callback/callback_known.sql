@@ -16,18 +16,18 @@
 CREATE OR REPLACE TEMP TABLE lifecycle_service AS
 WITH initialised AS (
     SELECT event_id, thread_id, process_id, node_handle, service_handle
-    FROM staging.located('ros2_rcl_service_init')
+    FROM staging.located('raw.ros2_rcl_service_init')
 ),
 machine AS (
     SELECT event_id, thread_id, node_handle
-    FROM staging.located('ros2_rcl_lifecycle_state_machine_init')
+    FROM staging.located('raw.ros2_rcl_lifecycle_state_machine_init')
 ),
 -- A service of rclcpp has its callback before the thread initialises the next.
 added AS (
     SELECT
         a.event_id, a.thread_id, i.event_id AS init_event_id,
         a.service_handle = i.service_handle AS is_own
-    FROM staging.located('ros2_rclcpp_service_callback_added') AS a
+    FROM staging.located('raw.ros2_rclcpp_service_callback_added') AS a
     ASOF JOIN initialised AS i ON a.thread_id = i.thread_id AND a.event_id >= i.event_id
 ),
 service AS (
@@ -68,20 +68,20 @@ WITH added AS (
         a.event_id, a.ts_ns, a.process_id, a.callback, 'subscription' AS kind,
         o.subscription_event_id, NULL::BIGINT AS timer_event_id,
         NULL::BIGINT AS service_event_id, NULL::UBIGINT AS service_handle
-    FROM staging.located('ros2_rclcpp_subscription_callback_added') AS a
+    FROM staging.located('raw.ros2_rclcpp_subscription_callback_added') AS a
     LEFT JOIN staging.subscription_object AS o ON a.event_id = o.event_id
     UNION ALL
     SELECT
         a.event_id, a.ts_ns, a.process_id, a.callback, 'timer', NULL, u.timer_event_id, NULL, NULL
-    FROM staging.located('ros2_rclcpp_timer_callback_added') AS a
+    FROM staging.located('raw.ros2_rclcpp_timer_callback_added') AS a
     JOIN staging.timer_use AS u ON a.event_id = u.event_id AND u.has_callback
     UNION ALL
     SELECT
         a.event_id, a.ts_ns, a.process_id, a.callback, 'service', NULL, NULL,
         coalesce(l.service_event_id, s.event_id), a.service_handle
-    FROM staging.located('ros2_rclcpp_service_callback_added') AS a
+    FROM staging.located('raw.ros2_rclcpp_service_callback_added') AS a
     LEFT JOIN lifecycle_service AS l ON a.event_id = l.event_id
-    ASOF LEFT JOIN staging.located('ros2_rcl_service_init') AS s
+    ASOF LEFT JOIN staging.located('raw.ros2_rcl_service_init') AS s
         ON a.process_id = s.process_id
         AND a.service_handle = s.service_handle
         AND a.event_id >= s.event_id
@@ -95,7 +95,7 @@ registered AS (
         END AS symbol,
         CASE WHEN r.symbol LIKE '#msgflow %' THEN 'function' ELSE 'unknown' END AS kind,
         a.event_id AS added_event_id
-    FROM staging.located('ros2_rclcpp_callback_register') AS r
+    FROM staging.located('raw.ros2_rclcpp_callback_register') AS r
     ASOF LEFT JOIN added AS a
         ON r.process_id = a.process_id AND r.callback = a.callback AND r.event_id >= a.event_id
     WHERE r.symbol NOT LIKE '#msgflow %' OR r.symbol LIKE '#msgflow function %'

@@ -81,7 +81,7 @@ agreed AS (
 ),
 owner AS (
     SELECT event_id, process_id, timer_handle AS handle, 'timer' AS kind, event_id AS owner_event_id
-    FROM staging.located('ros2_rcl_timer_init')
+    FROM staging.located('raw.ros2_rcl_timer_init')
     UNION ALL
     SELECT event_id, process_id, subscription_handle, 'subscription', event_id
     FROM staging.subscription_known
@@ -158,7 +158,7 @@ behind AS (
 ),
 waited AS (
     SELECT thread_id, event_id
-    FROM staging.located('ros2_rclcpp_executor_wait_for_work')
+    FROM staging.located('raw.ros2_rclcpp_executor_wait_for_work')
     WHERE thread_id IN (SELECT thread_id FROM behind)
 ),
 -- A gap may hide that the thread waited in between.

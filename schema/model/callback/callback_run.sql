@@ -27,15 +27,7 @@ event AS (
     UNION ALL
     SELECT event_id, thread_index FROM raw.ros2_callback_end
 ),
-located AS (
-    SELECT e.event_id, c.thread_id
-    FROM event AS e
-    JOIN staging.thread AS c
-        ON e.thread_index = c.thread_index
-        AND e.event_id >= c.from_event_id
-        AND e.event_id < c.until_event_id
-    WHERE c.thread_id IN (SELECT thread_id FROM gap)
-)
+located AS (FROM staging.located('event') WHERE thread_id IN (SELECT thread_id FROM gap))
 SELECT e.event_id, g.segment
 FROM located AS e
 ASOF JOIN gap AS g ON e.thread_id = g.thread_id AND e.event_id >= g.event_id;
@@ -79,14 +71,6 @@ WITH RECURSIVE event AS (
     FROM raw.ros2_callback_end AS e
     ANTI JOIN callback_plain AS p ON e.event_id = p.end_event_id
 ),
-located AS (
-    SELECT e.*, c.thread_id, c.process_id
-    FROM event AS e
-    JOIN staging.thread AS c
-        ON e.thread_index = c.thread_index
-        AND e.event_id >= c.from_event_id
-        AND e.event_id < c.until_event_id
-),
 callback_event AS MATERIALIZED (
     SELECT
         e.event_id, e.ts_ns, e.trace_index, e.thread_id, e.process_id, e.callback_handle,
@@ -95,7 +79,7 @@ callback_event AS MATERIALIZED (
         e.previous_callback_event_id, e.previous_executor_event_id,
         CASE WHEN x.event_id IS NULL THEN e.previous_executor_event_id END AS executor_event_id,
         coalesce(i.segment, 0) AS segment
-    FROM located AS e
+    FROM staging.located('event') AS e
     LEFT JOIN callback_segment AS i ON e.event_id = i.event_id
     LEFT JOIN (SELECT event_id FROM staging.near_gap WHERE sequence = 'call' AND is_behind) AS c
         ON e.event_id = c.event_id

@@ -3,7 +3,7 @@
 --     was over; else the nearest one around that which was not over.
 -- grain: one row per event of a name that the user asked for
 -- when: raw.user_event
-WITH RECURSIVE event AS MATERIALIZED (SELECT * FROM staging.located('user_event')),
+WITH RECURSIVE event AS MATERIALIZED (SELECT * FROM staging.located('raw.user_event')),
 run AS MATERIALIZED (
     SELECT
         i.callback_instance_id, i.start_event_id, i.thread_id, i.effective_end_event_id,

@@ -4,13 +4,13 @@
 -- when: staging.callback_group_owner
 WITH entry AS (
     SELECT event_id, process_id, callback_group_addr, 'timer' AS kind, timer_handle AS handle
-    FROM staging.located('ros2_caret_callback_group_add_timer')
+    FROM staging.located('raw.ros2_caret_callback_group_add_timer')
     UNION ALL
     SELECT event_id, process_id, callback_group_addr, 'subscription', subscription_handle
-    FROM staging.located('ros2_caret_callback_group_add_subscription')
+    FROM staging.located('raw.ros2_caret_callback_group_add_subscription')
     UNION ALL
     SELECT event_id, process_id, callback_group_addr, 'service', service_handle
-    FROM staging.located('ros2_caret_callback_group_add_service')
+    FROM staging.located('raw.ros2_caret_callback_group_add_service')
 ),
 object AS (
     SELECT event_id, process_id, 'timer' AS kind, timer_handle AS handle, timer_id AS object_id

@@ -126,11 +126,13 @@ WITH deduced AS (
         CASE
             WHEN count(*) > 1 THEN 'multi_threaded'
             WHEN bool_or(m.is_spinning) THEN 'single_threaded'
-            WHEN bool_or(o.thread_id IS NOT NULL) THEN 'events'
+            WHEN bool_or(m.thread_id IN (
+                SELECT thread_id FROM staging.queued_message WHERE is_in_order
+            ))
+                THEN 'events'
             ELSE 'unknown'
         END AS kind
     FROM executor_member AS m
-    LEFT JOIN staging.executor_in_order AS o ON m.thread_id = o.thread_id
     GROUP BY m.first_thread_id
 ),
 every_executor AS (

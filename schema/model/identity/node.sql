@@ -12,7 +12,7 @@ WITH every_node AS (
         node_handle,
         ts_ns AS created_ns,
         false AS is_inferred
-    FROM staging.located('ros2_rcl_node_init')
+    FROM staging.located('raw.ros2_rcl_node_init')
     UNION ALL BY NAME
     SELECT DISTINCT node_event_id AS event_id, process_id, node_handle, true AS is_inferred
     FROM staging.object_node

@@ -9,26 +9,21 @@
 --     raw.ros2_rcl_service_init, raw.ros2_rcl_client_init, raw.ros2_rclcpp_timer_link_node,
 --     raw.ros2_rcl_lifecycle_state_machine_init
 WITH initialisation AS (
-    SELECT event_id, process_id, thread_id, 'node' AS kind, node_handle
-    FROM staging.located('ros2_rcl_node_init')
+    SELECT event_id, thread_index, 'node' AS kind, node_handle FROM raw.ros2_rcl_node_init
     UNION ALL
-    SELECT event_id, process_id, thread_id, 'publisher', node_handle
-    FROM staging.located('ros2_rcl_publisher_init')
+    SELECT event_id, thread_index, 'publisher', node_handle FROM raw.ros2_rcl_publisher_init
     UNION ALL
-    SELECT event_id, process_id, thread_id, 'subscription', node_handle
-    FROM staging.located('ros2_rcl_subscription_init')
+    SELECT event_id, thread_index, 'subscription', node_handle
+    FROM raw.ros2_rcl_subscription_init
     UNION ALL
-    SELECT event_id, process_id, thread_id, 'service', node_handle
-    FROM staging.located('ros2_rcl_service_init')
+    SELECT event_id, thread_index, 'service', node_handle FROM raw.ros2_rcl_service_init
     UNION ALL
-    SELECT event_id, process_id, thread_id, 'client', node_handle
-    FROM staging.located('ros2_rcl_client_init')
+    SELECT event_id, thread_index, 'client', node_handle FROM raw.ros2_rcl_client_init
     UNION ALL
-    SELECT event_id, process_id, thread_id, 'timer', node_handle
-    FROM staging.located('ros2_rclcpp_timer_link_node')
+    SELECT event_id, thread_index, 'timer', node_handle FROM raw.ros2_rclcpp_timer_link_node
     UNION ALL
-    SELECT event_id, process_id, thread_id, 'lifecycle', node_handle
-    FROM staging.located('ros2_rcl_lifecycle_state_machine_init')
+    SELECT event_id, thread_index, 'lifecycle', node_handle
+    FROM raw.ros2_rcl_lifecycle_state_machine_init
 ),
 construction AS (
     SELECT
@@ -37,7 +32,7 @@ construction AS (
         AND lead(kind) OVER on_thread = 'node'
         AND lead(node_handle) OVER on_thread = node_handle
         AND first_value(kind) OVER of_handle <> 'node' AS precedes_own_node
-    FROM initialisation
+    FROM staging.located('initialisation')
     WINDOW
         on_thread AS (PARTITION BY thread_id ORDER BY event_id),
         of_handle AS (PARTITION BY process_id, node_handle ORDER BY event_id)

@@ -98,7 +98,7 @@ WITH process AS (
 ),
 version AS (
     SELECT process_id, arg_min(version, event_id) AS tracetools_version
-    FROM staging.located('ros2_rcl_init')
+    FROM staging.located('raw.ros2_rcl_init')
     GROUP BY process_id
 )
 SELECT

@@ -11,7 +11,7 @@ initialised AS (
     SELECT
         i.event_id, i.process_id, i.thread_id, i.subscription, c.construction_event_id,
         s.event_id AS subscription_event_id
-    FROM staging.located('ros2_rclcpp_subscription_init') AS i
+    FROM staging.located('raw.ros2_rclcpp_subscription_init') AS i
     ASOF LEFT JOIN construction AS c
         ON i.thread_id = c.thread_id AND i.event_id >= c.construction_event_id
     ASOF LEFT JOIN staging.subscription_known AS s
@@ -21,10 +21,10 @@ initialised AS (
 ),
 use AS (
     SELECT event_id, process_id, thread_id, subscription
-    FROM staging.located('ros2_rclcpp_subscription_callback_added')
+    FROM staging.located('raw.ros2_rclcpp_subscription_callback_added')
     UNION ALL
     SELECT event_id, process_id, thread_id, subscription
-    FROM staging.located('ros2_rclcpp_ipb_to_subscription')
+    FROM staging.located('raw.ros2_rclcpp_ipb_to_subscription')
 ),
 placed AS (
     SELECT u.event_id, u.process_id, u.thread_id, u.subscription, c.construction_event_id

@@ -4,7 +4,7 @@
 -- when: raw.ros2_rcl_timer_init, staging.timer_use, staging.callback_owner
 WITH every_timer AS (
     SELECT event_id, process_id, period AS period_ns, timer_handle, ts_ns AS created_ns
-    FROM staging.located('ros2_rcl_timer_init')
+    FROM staging.located('raw.ros2_rcl_timer_init')
     UNION ALL
     SELECT timer_event_id, process_id, NULL, any_value(timer_handle), NULL
     FROM (

@@ -13,7 +13,7 @@ stated AS (
     UNION ALL
     SELECT c.event_id, staging.gid_bytes(r.gid)
     FROM inferred AS c
-    ASOF JOIN staging.located('ros2_rmw_client_init') AS r
+    ASOF JOIN staging.located('raw.ros2_rmw_client_init') AS r
         ON c.process_id = r.process_id
         AND c.rmw_handle = r.rmw_client_handle
         AND c.event_id >= r.event_id

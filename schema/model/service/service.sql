@@ -37,7 +37,7 @@ WITH every_service AS (
     SELECT
         event_id, process_id, service_name, service_handle, rmw_service_handle AS rmw_handle,
         ts_ns AS created_ns
-    FROM staging.located('ros2_rcl_service_init')
+    FROM staging.located('raw.ros2_rcl_service_init')
     UNION ALL
     SELECT event_id, process_id, service_name, service_handle, rmw_handle, NULL
     FROM service_inferred

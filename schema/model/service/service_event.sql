@@ -20,7 +20,7 @@ requester AS (
 ),
 service AS (
     SELECT event_id, process_id, rmw_service_handle AS handle
-    FROM staging.located('ros2_rcl_service_init')
+    FROM staging.located('raw.ros2_rcl_service_init')
 )
 SELECT
     e.event_id, e.ts_ns, e.thread_id, e.process_id, e.is_request, e.handle AS rmw_handle, g.gid,
