@@ -5,8 +5,8 @@
 WITH every_timer AS (
     SELECT event_id, process_id, period AS period_ns, timer_handle, ts_ns AS created_ns
     FROM staging.located('raw.ros2_rcl_timer_init')
-    UNION ALL
-    SELECT timer_event_id, process_id, NULL, any_value(timer_handle), NULL
+    UNION ALL BY NAME
+    SELECT timer_event_id AS event_id, process_id, any_value(timer_handle) AS timer_handle
     FROM (
         SELECT timer_event_id, process_id, timer_handle FROM staging.timer_use WHERE is_inferred
         UNION ALL

@@ -9,10 +9,9 @@ WITH learned AS (
     GROUP BY u.client_event_id
 ),
 every_client AS (
-    SELECT event_id, process_id, service_name, client_handle, rmw_handle, created_ns
     FROM staging.client_known
-    UNION ALL
-    SELECT e.event_id, e.process_id, l.service_name, NULL, e.rmw_handle, NULL
+    UNION ALL BY NAME
+    SELECT e.event_id, e.process_id, l.service_name, e.rmw_handle
     FROM staging.client_event AS e
     LEFT JOIN learned AS l ON e.event_id = l.client_event_id
     WHERE e.is_inferred AND e.event_id = e.client_event_id

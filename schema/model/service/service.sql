@@ -27,8 +27,8 @@ FROM staging.service_event AS e
 LEFT JOIN learned AS l ON e.event_id = l.service_event_id
 LEFT JOIN attached AS a ON e.event_id = a.service_event_id
 WHERE e.is_inferred AND e.event_id = e.service_event_id
-UNION ALL
-SELECT owner_event_id, process_id, NULL, any_value(handle), NULL
+UNION ALL BY NAME
+SELECT owner_event_id AS event_id, process_id, any_value(handle) AS service_handle
 FROM staging.callback_owner
 WHERE kind = 'service' AND is_inferred
 GROUP BY owner_event_id, process_id;
@@ -38,8 +38,7 @@ WITH every_service AS (
         event_id, process_id, service_name, service_handle, rmw_service_handle AS rmw_handle,
         ts_ns AS created_ns
     FROM staging.located('raw.ros2_rcl_service_init')
-    UNION ALL
-    SELECT event_id, process_id, service_name, service_handle, rmw_handle, NULL
+    UNION ALL BY NAME
     FROM service_inferred
 )
 SELECT
