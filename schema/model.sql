@@ -30,12 +30,11 @@ CREATE TABLE staging.callback_known (event_id BIGINT, created_ns BIGINT, process
     service_event_id BIGINT, service_handle UBIGINT, symbol VARCHAR);
 CREATE TABLE staging.callback_number (start_event_id BIGINT, callback_instance_id BIGINT,
     callback_id BIGINT, take_id BIGINT);
-CREATE TABLE staging.callback_object (callback_id BIGINT, event_id BIGINT, callback_event_id BIGINT,
-    process_id BIGINT, kind VARCHAR, subscription_event_id BIGINT, timer_event_id BIGINT,
-    service_event_id BIGINT, callback_handle UBIGINT, symbol VARCHAR, created_ns BIGINT);
-CREATE TABLE staging.callback_owner (process_id BIGINT, callback_handle UBIGINT,
-    callback_event_id BIGINT, kind VARCHAR, handle UBIGINT, owner_event_id BIGINT,
-    is_inferred BOOLEAN, is_eliminated BOOLEAN);
+CREATE TABLE staging.callback_object (callback_id BIGINT, event_id BIGINT, created_ns BIGINT,
+    process_id BIGINT, callback_handle UBIGINT, kind VARCHAR, subscription_event_id BIGINT,
+    timer_event_id BIGINT, service_event_id BIGINT, service_handle UBIGINT, symbol VARCHAR);
+CREATE TABLE staging.callback_owner (process_id BIGINT, callback_event_id BIGINT, kind VARCHAR,
+    handle UBIGINT, owner_event_id BIGINT, is_inferred BOOLEAN, is_eliminated BOOLEAN);
 CREATE TABLE staging.callback_preemptor (callback_instance_id BIGINT, preemptor_thread_id BIGINT,
     preemptor_other_thread_id BIGINT, preemptor_priority INTEGER, preempted_ns BIGINT,
     runnable_ns BIGINT);

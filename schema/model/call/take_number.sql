@@ -98,8 +98,7 @@ WITH dequeue AS (
 ),
 used AS (
     SELECT DISTINCT
-        d.process_id, d.buffer_handle, b.callback_handle, b.callback_event_id,
-        b.subscription_event_id
+        d.process_id, d.buffer_handle, b.callback_event_id, b.subscription_event_id
     FROM dequeue AS d
     JOIN staging.callback_binding AS b ON d.start_event_id = b.take_event_id
 ),
@@ -114,9 +113,7 @@ reader AS (
     FROM (
         SELECT
             *,
-            count(*) OVER (
-                PARTITION BY process_id, callback_handle, callback_event_id
-            ) AS buffer_count
+            count(*) OVER (PARTITION BY callback_event_id) AS buffer_count
         FROM used
     )
     GROUP BY process_id, buffer_handle
@@ -143,16 +140,16 @@ LEFT JOIN reader AS r ON b.process_id = r.process_id AND b.buffer_handle = r.buf
 -- its first instance.
 -- when: buffer_owner, staging.callback_binding WHERE take_event_id IS NULL AND
 --     subscription_event_id IS NULL AND (kind = 'subscription' OR (is_intra_process AND
---     coalesce(kind = 'unknown', true)))
+--     kind = 'unknown'))
 -- columns: start_event_id BIGINT, process_id BIGINT, subscription_event_id BIGINT, is_inferred
 --     BOOLEAN
 CREATE OR REPLACE TEMP TABLE take_inferred AS
 WITH handed_over AS (
-    SELECT start_event_id, process_id, callback_handle, callback_event_id
+    SELECT start_event_id, process_id, callback_event_id
     FROM staging.callback_binding
     WHERE take_event_id IS NULL
         AND subscription_event_id IS NULL
-        AND (kind = 'subscription' OR (is_intra_process AND coalesce(kind = 'unknown', true)))
+        AND (kind = 'subscription' OR (is_intra_process AND kind = 'unknown'))
 ),
 dequeue AS (
     SELECT t.start_event_id, t.process_id, o.subscription_event_id, o.is_inferred
@@ -162,38 +159,32 @@ dequeue AS (
     WHERE t.method = 'ring_buffer' AND NOT t.is_known AND o.subscription_event_id IS NOT NULL
 ),
 callback AS (
-    SELECT process_id, callback_handle, callback_event_id, min(start_event_id) AS event_id
+    SELECT callback_event_id, min(start_event_id) AS event_id
     FROM handed_over
-    GROUP BY process_id, callback_handle, callback_event_id
+    GROUP BY callback_event_id
 ),
 handed AS (
     SELECT
-        b.process_id, b.callback_handle, b.callback_event_id,
+        b.callback_event_id,
         CASE WHEN bool_and(d.start_event_id IS NOT NULL) THEN min(d.subscription_event_id) END
             AS subscription_event_id,
         bool_and(d.is_inferred) AS is_inferred
     FROM staging.callback_binding AS b
-    SEMI JOIN callback AS c ON b.process_id = c.process_id AND b.callback_handle = c.callback_handle
+    SEMI JOIN callback AS c ON b.callback_event_id = c.callback_event_id
     LEFT JOIN dequeue AS d ON b.take_event_id = d.start_event_id
     WHERE b.take_event_id IS NOT NULL
-    GROUP BY b.process_id, b.callback_handle, b.callback_event_id
+    GROUP BY b.callback_event_id
 )
 SELECT start_event_id, process_id, subscription_event_id, is_inferred FROM dequeue
 UNION ALL
 SELECT
     l.start_event_id, l.process_id,
-    CASE WHEN h.process_id IS NULL THEN c.event_id ELSE h.subscription_event_id END,
+    CASE WHEN h.callback_event_id IS NULL THEN c.event_id ELSE h.subscription_event_id END,
     coalesce(h.is_inferred, true)
 FROM handed_over AS l
-JOIN callback AS c
-    ON l.process_id = c.process_id
-    AND l.callback_handle = c.callback_handle
-    AND l.callback_event_id IS NOT DISTINCT FROM c.callback_event_id
-LEFT JOIN handed AS h
-    ON l.process_id = h.process_id
-    AND l.callback_handle = h.callback_handle
-    AND l.callback_event_id IS NOT DISTINCT FROM h.callback_event_id
-WHERE h.process_id IS NULL OR h.subscription_event_id IS NOT NULL;
+JOIN callback AS c ON l.callback_event_id = c.callback_event_id
+LEFT JOIN handed AS h ON l.callback_event_id = h.callback_event_id
+WHERE h.callback_event_id IS NULL OR h.subscription_event_id IS NOT NULL;
 
 WITH run AS (
     SELECT

@@ -1,4 +1,5 @@
--- description: Callback instances with their callback object, and the take or the request that
+-- description: Callback instances with their callback object, by the event that made it, else by
+--     its first instance, and the take or the request that
 --     they were called with. The callback_start directly follows the take's last layer, or the
 --     rmw_take_request, on its thread, with no event of the executor between the two. Neither an
 --     rmw take nor a request is for an intra-process call, nor is a dequeue for another one. The
@@ -75,10 +76,19 @@ WITH begun AS NOT MATERIALIZED (
     FROM staging.callback_run
 ),
 known AS (SELECT event_id, process_id, callback_handle AS handle FROM staging.callback_known),
+resolved AS NOT MATERIALIZED (FROM staging.with_latest('begun', 'known')),
+first_run AS (
+    SELECT process_id, handle, min(event_id) AS event_id
+    FROM resolved
+    WHERE object_event_id IS NULL
+    GROUP BY process_id, handle
+),
 run AS (
     SELECT
         b.event_id AS start_event_id, b.process_id, b.handle AS callback_handle,
-        b.is_intra_process, b.object_event_id AS callback_event_id, k.kind,
+        b.is_intra_process,
+        coalesce(b.object_event_id, f.event_id) AS callback_event_id,
+        coalesce(k.kind, 'unknown') AS kind,
         k.subscription_event_id, k.service_event_id,
         -- As recorded: what the executor said after the take stands, whatever else was lost. It is
         -- NULL only where the thread had no executor event at all.
@@ -86,8 +96,10 @@ run AS (
             WHEN coalesce(b.previous_executor_event_id < b.previous_event_id, true)
                 THEN b.previous_event_id
         END AS called_by_event_id
-    FROM staging.with_latest('begun', 'known') AS b
+    FROM resolved AS b
     LEFT JOIN staging.callback_known AS k ON b.object_event_id = k.event_id
+    LEFT JOIN first_run AS f
+        ON b.object_event_id IS NULL AND b.process_id = f.process_id AND b.handle = f.handle
 )
 SELECT
     r.start_event_id, r.process_id, r.callback_handle, r.is_intra_process, r.callback_event_id,
@@ -98,12 +110,12 @@ SELECT
 FROM run AS r
 LEFT JOIN staging.take_chain AS t
     ON r.called_by_event_id = t.end_event_id
-    AND coalesce(r.kind IN ('subscription', 'unknown', 'function'), true)
+    AND r.kind IN ('subscription', 'unknown', 'function')
     AND r.is_intra_process = (t.method = 'ring_buffer')
     AND coalesce(r.subscription_event_id = t.subscription_event_id, true)
 LEFT JOIN (SELECT * FROM staging.service_event WHERE is_request) AS q
     ON r.called_by_event_id = q.event_id
-    AND coalesce(r.kind IN ('service', 'unknown', 'function'), true)
+    AND r.kind IN ('service', 'unknown', 'function')
     AND NOT r.is_intra_process
     AND coalesce(r.service_event_id = q.service_event_id, true)
 LEFT JOIN callback_step AS p ON r.start_event_id = p.start_event_id

@@ -5,7 +5,7 @@
 --     requests that services take were not enabled. The owner is a placeholder where this was
 --     decided by elimination, or where the service was not seen to be initialised.
 -- grain: one row per callback whose owner is decided
--- when: staging.callback_binding WHERE coalesce(kind = 'unknown', true),
+-- when: staging.callback_binding WHERE kind = 'unknown',
 --     staging.callback_known WHERE kind = 'service' AND service_event_id IS NULL
 
 -- Executor events directly before instances of such callbacks. The executor names the handle that
@@ -13,47 +13,37 @@
 -- another event comes in between, it is neither.
 CREATE OR REPLACE TEMP TABLE callback_trigger AS
 WITH unowned AS (
-    SELECT start_event_id, process_id, callback_handle, callback_event_id, is_intra_process,
-        take_event_id, request_event_id
+    SELECT
+        start_event_id, process_id, callback_event_id, is_intra_process, take_event_id,
+        request_event_id
     FROM staging.callback_binding
-    WHERE coalesce(kind = 'unknown', true)
+    WHERE kind = 'unknown'
 ),
 explained AS (
-    SELECT DISTINCT process_id, callback_handle, callback_event_id
+    SELECT DISTINCT callback_event_id
     FROM unowned
     WHERE is_intra_process OR take_event_id IS NOT NULL OR request_event_id IS NOT NULL
 ),
 run AS (
     SELECT
-        u.start_event_id, u.process_id, u.callback_handle, u.callback_event_id, p.trace_index,
-        p.thread_id, p.executor_event_id,
+        u.start_event_id, u.process_id, u.callback_event_id, p.trace_index, p.thread_id,
+        p.executor_event_id,
         coalesce(p.previous_event_id < p.executor_event_id, true) AS is_direct
     FROM unowned AS u
-    ANTI JOIN explained AS e
-        ON u.process_id = e.process_id
-        AND u.callback_handle = e.callback_handle
-        AND u.callback_event_id IS NOT DISTINCT FROM e.callback_event_id
+    ANTI JOIN explained AS e ON u.callback_event_id = e.callback_event_id
     JOIN staging.callback_run AS p ON u.start_event_id = p.start_event_id
     WHERE p.executor_event_id IS NOT NULL
 ),
-named AS (
-    SELECT r.start_event_id, x.handle
-    FROM run AS r
-    JOIN raw.ros2_rclcpp_executor_execute AS x ON r.executor_event_id = x.event_id
-    WHERE r.is_direct
-),
-ready AS (
-    SELECT r.start_event_id
-    FROM run AS r
-    JOIN raw.ros2_rclcpp_executor_get_next_ready AS x ON r.executor_event_id = x.event_id
-    WHERE r.is_direct
+announced AS (
+    SELECT event_id, handle, false AS is_ready FROM raw.ros2_rclcpp_executor_execute
+    UNION ALL
+    SELECT event_id, NULL, true FROM raw.ros2_rclcpp_executor_get_next_ready
 )
 SELECT
-    r.start_event_id, r.process_id, r.callback_handle, r.callback_event_id, r.trace_index,
-    r.thread_id, n.handle, y.start_event_id IS NOT NULL AS is_ready
+    r.start_event_id, r.process_id, r.callback_event_id, r.trace_index, r.thread_id, a.handle,
+    coalesce(a.is_ready, false) AS is_ready
 FROM run AS r
-LEFT JOIN named AS n ON r.start_event_id = n.start_event_id
-LEFT JOIN ready AS y ON r.start_event_id = y.start_event_id;
+LEFT JOIN announced AS a ON r.is_direct AND r.executor_event_id = a.event_id;
 
 -- If the executor said the same before each instance of a callback: the handle that it named (NULL
 -- if it named none), the timer or subscription of that handle if the trace has it, and which
@@ -70,12 +60,15 @@ WITH enabled AS (
 ),
 agreed AS (
     SELECT
-        t.process_id, t.callback_handle, t.callback_event_id, any_value(t.handle) AS handle,
-        min(t.start_event_id) AS start_event_id, bool_and(e.has_takes) AS has_takes,
-        bool_and(e.has_executions) AS has_executions, bool_or(e.has_requests) AS has_requests
+        t.process_id, t.callback_event_id,
+        any_value(t.handle) AS handle,
+        min(t.start_event_id) AS start_event_id,
+        bool_and(e.has_takes) AS has_takes,
+        bool_and(e.has_executions) AS has_executions,
+        bool_or(e.has_requests) AS has_requests
     FROM callback_trigger AS t
     LEFT JOIN enabled AS e ON t.trace_index = e.trace_index
-    GROUP BY t.process_id, t.callback_handle, t.callback_event_id
+    GROUP BY t.process_id, t.callback_event_id
     HAVING sum(t.is_ready::INTEGER) = count(*)
         OR (count(t.handle) = count(*) AND count(DISTINCT t.handle) = 1)
 ),
@@ -92,8 +85,8 @@ owner AS (
     GROUP BY process_id, timer_event_id
 )
 SELECT
-    a.process_id, a.callback_handle, a.callback_event_id, a.handle, a.start_event_id,
-    a.has_takes, a.has_executions, a.has_requests, o.kind, o.owner_event_id,
+    a.process_id, a.callback_event_id, a.handle, a.start_event_id, a.has_takes, a.has_executions,
+    a.has_requests, o.kind, o.owner_event_id,
     a.handle IS NOT NULL
     AND count(*) OVER (PARTITION BY a.process_id, a.handle, o.owner_event_id) > 1 AS is_disputed
 FROM agreed AS a
@@ -107,17 +100,16 @@ ASOF LEFT JOIN owner AS o
 WITH candidate AS (
     SELECT t.start_event_id, t.process_id, t.thread_id
     FROM callback_trigger AS t
-    JOIN callback_announced AS a
-        ON t.process_id = a.process_id
-        AND t.callback_handle = a.callback_handle
-        AND t.callback_event_id IS NOT DISTINCT FROM a.callback_event_id
+    JOIN callback_announced AS a ON t.callback_event_id = a.callback_event_id
     WHERE a.handle IS NOT NULL AND a.kind IS NULL
 ),
 -- Runs of the processes concerned.
 run AS (
     SELECT
-        r.start_event_id, r.process_id, r.thread_id, r.callback_handle, r.depth,
-        r.previous_event_id, r.executor_event_id, r.is_intra_process, b.kind, b.take_event_id
+        r.start_event_id, r.process_id, r.thread_id, r.depth, r.previous_event_id,
+        r.executor_event_id, r.is_intra_process, b.kind, b.take_event_id,
+        count(DISTINCT r.thread_id) OVER (PARTITION BY r.process_id, r.callback_handle) > 1
+            AS has_several_threads
     FROM staging.callback_run AS r
     JOIN staging.callback_binding AS b ON r.start_event_id = b.start_event_id
     WHERE r.process_id IN (SELECT process_id FROM candidate)
@@ -133,23 +125,13 @@ subscription_without_take AS (
     UNION ALL
     SELECT process_id FROM callback_announced WHERE kind = 'subscription'
 ),
-several_threads AS (
-    SELECT DISTINCT r.thread_id
-    FROM run AS r
-    JOIN (
-        SELECT process_id, callback_handle
-        FROM run
-        GROUP BY process_id, callback_handle
-        HAVING count(DISTINCT thread_id) > 1
-    ) AS s ON r.process_id = s.process_id AND r.callback_handle = s.callback_handle
-),
 served AS (
     SELECT thread_id, start_event_id
     FROM run
     WHERE depth = 1
         AND (take_event_id IS NOT NULL OR kind = 'service')
         AND thread_id IN (SELECT thread_id FROM candidate)
-        AND thread_id NOT IN (SELECT thread_id FROM several_threads)
+        AND thread_id NOT IN (SELECT thread_id FROM run WHERE has_several_threads)
 ),
 behind AS (
     SELECT c.start_event_id, c.process_id, c.thread_id, s.start_event_id AS served_event_id
@@ -184,8 +166,7 @@ untraced_take AS (
 ),
 decided AS (
     SELECT
-        a.process_id, a.callback_handle, a.callback_event_id, a.start_event_id, a.handle,
-        a.owner_event_id,
+        a.process_id, a.callback_event_id, a.start_event_id, a.handle, a.owner_event_id,
         CASE
             WHEN a.is_disputed THEN NULL
             WHEN a.kind IS NOT NULL THEN a.kind
@@ -207,7 +188,7 @@ service AS (
     GROUP BY process_id, service_handle
 )
 SELECT
-    process_id, callback_handle, callback_event_id, kind, handle,
+    process_id, callback_event_id, kind, handle,
     coalesce(owner_event_id, start_event_id) AS owner_event_id,
     owner_event_id IS NULL AS is_inferred,
     owner_event_id IS NULL AS is_eliminated
@@ -215,8 +196,7 @@ FROM decided
 WHERE kind IS NOT NULL
 UNION ALL
 SELECT
-    k.process_id, k.callback_handle, k.event_id, 'service', k.service_handle, s.event_id, true,
-    false
+    k.process_id, k.event_id, 'service', k.service_handle, s.event_id, true, false
 FROM staging.callback_known AS k
 JOIN service AS s ON k.process_id = s.process_id AND k.service_handle = s.service_handle
 ANTI JOIN asked AS q ON k.event_id = q.callback_event_id

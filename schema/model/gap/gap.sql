@@ -10,10 +10,11 @@
 --     its end starts at or after its begin, or this or an earlier gap ends after its begin. CPU -1
 --     means all CPUs.
 -- grain: one row per gap in a recording
--- when: staging.packet WHERE begin_ns - covered_until_ns >= staging.pause_limit().least_ns
---     AND begin_ns <= last_begin_ns, staging.packet WHERE domain IS DISTINCT FROM 'kernel'
+-- when: staging.packet WHERE domain IS DISTINCT FROM 'kernel'
 --     AND (discarded_event_count IS DISTINCT FROM 0 OR lost_packet_count IS DISTINCT FROM 0
---     OR stream_end_ns < recording_last_event_ns)
+--     OR stream_end_ns < recording_last_event_ns
+--     OR (begin_ns - covered_until_ns >= staging.pause_limit().least_ns
+--     AND begin_ns <= last_begin_ns))
 
 -- Silences in which nothing was recorded: tracing had been stopped. All streams of a recording are
 -- silent at once between packets, for a millisecond or longer. A silence is a pause where it can be
