@@ -62,10 +62,13 @@ def translate(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
     return True
 
 
-def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> None:
+def create(
+    con: duckdb.DuckDBPyConnection, header: Header, empty: set[str], *, keep: bool = False
+) -> None:
     """Create an object of the model, after all that it needs.
 
-    `empty` names the tables that exist and have no row. This function keeps it up to date.
+    `empty` names the tables that exist and have no row. This function keeps it up to date. Tables
+    of steps are dropped, unless a test wants to see them.
     """
     if header.name == _FINDING:
         found = kinds_with_rows(con, "input", {}, empty=empty)
@@ -81,7 +84,7 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
             _create_step(con, step, empty)
         table = f"CREATE OR REPLACE TABLE {header.name} AS\n{header.body}"
         _note(con, header.name, table, empty)
-        for step in header.steps:
+        for step in () if keep else header.steps:
             con.execute(f"DROP TABLE temp.{step.table}")
 
 

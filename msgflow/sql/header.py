@@ -65,10 +65,12 @@ Outside of `schema/public`, what most statements take needs no declaration: the 
 ns, without its end; `origin_ns`, the moment from which times of pages count.
 
 The tables that a statement looks up stay in memory until it ends. A query may therefore go in
-steps: other statements stand before its own, each of the form
-`CREATE OR REPLACE TEMP TABLE name AS SELECT …;`. A line `-- when: main.a, main.b` above one names
-what it has its rows from, as in the header: where that has no row, the table is empty, and DuckDB
-does not look at the SQL. The line below says which columns it has: `-- columns: a_id BIGINT`.
+steps, as may an object of the model: other statements stand before its own, each of the form
+`CREATE OR REPLACE TEMP TABLE name AS SELECT …;`. Nothing else reads these tables. A line
+`-- when: main.a, main.b` above one names what it has its rows from, as in the header: where that
+has no row, the table is empty, and DuckDB does not look at the SQL. The line below says which
+columns it has: `-- columns: a_id BIGINT`. Both may be continued, and of other steps the first ones
+stand in front.
 
 What few recordings have may stand behind `WHERE $has_kernel`, or another name of RECORDED
 (`msgflow.sql.statement`). DuckDB plans nothing for it where no recording has any.

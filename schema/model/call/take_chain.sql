@@ -44,8 +44,7 @@ ASOF LEFT JOIN buffer AS b
 CREATE OR REPLACE TEMP TABLE agnocast_take AS
 WITH called AS (
     SELECT
-        event_id, ts_ns, trace_index, thread_id, process_id, entry_id,
-        pid_callback_info_id AS handle
+        event_id, ts_ns, trace_index, thread_id, process_id, pid_callback_info_id AS handle
     FROM staging.located('raw.agnocast_agnocast_create_callable')
 ),
 callback AS (
@@ -54,8 +53,7 @@ callback AS (
     WHERE kind = 'subscription'
 ),
 polled AS (
-    SELECT
-        event_id, ts_ns, trace_index, thread_id, process_id, entry_id, subscription_handle AS handle
+    SELECT event_id, ts_ns, trace_index, thread_id, process_id, subscription_handle AS handle
     FROM staging.located('raw.agnocast_agnocast_take')
     WHERE message <> 0
 ),

@@ -17,7 +17,7 @@ FROM staging.thread;
 -- that Fast DDS gives to a process begin with the same eight bytes, two of them random. `gap_ns`:
 -- begin of the first gap behind it.
 -- when: raw.ros2_rmw_publisher_init, raw.ros2_rmw_subscription_init
--- columns: process BIGINT, event_id BIGINT, handle UBIGINT, prefix USMALLINT[], gap_ns BIGINT
+-- columns: process BIGINT, event_id BIGINT, handle UBIGINT, prefix UTINYINT[], gap_ns BIGINT
 CREATE OR REPLACE TEMP TABLE foreign_endpoint AS
 WITH made AS (
     SELECT event_id, ts_ns, trace_index, thread_index, rmw_publisher_handle AS handle, gid
