@@ -85,7 +85,7 @@ def sources(by_name: Mapping[str, Header], name: str) -> list[str]:
 
 @cache
 def model() -> tuple[Header, ...]:
-    """Return all that an ingest makes of staged events, pass after pass, in the order of creation."""
+    """Return all that an ingest makes of staged events, in the order of creation."""
     return tuple(header for layer in MODEL_LAYERS for header in load(layer))
 
 

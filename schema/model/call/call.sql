@@ -1,7 +1,7 @@
 -- description: Layers of calls, those of one call under one number. Each layer names those that it
 --     `follows`. It continues a call only if it directly follows one of them on the thread, with no
---     gap between, and was given the same message. A stamp has no message. `layers` is the name of a
---     table with the layers: the first and last event of each, and what preceded the first.
+--     gap between, and was given the same message. A stamp has no message. `layers` is the name of
+--     a table with the layers: the first and last event of each, and what preceded the first.
 -- grain: one row per layer
 CREATE OR REPLACE MACRO staging.call(layers) AS TABLE
 WITH layer AS (

@@ -1,11 +1,11 @@
--- description: Layers of one take stitched together, as `staging.call` says, and the subscription that
---     took. A take whose rmw layer failed does not count, although upper layers may report it. Nor
---     does a take of the middleware itself. It has no rcl layer, although rcl takes are traced. Its
---     reader belongs to no rcl subscription, and never had an rcl layer. The subscription is the
---     one of the rmw handle or ring buffer that was initialised last before the take; NULL where
---     that was not traced. Of a ring buffer it may be known to which subscription object it belongs
---     (`is_known`), but not to which subscription. The buffer that a transient-local publisher
---     keeps belongs to none.
+-- description: Layers of one take stitched together, as `staging.call` says, and the subscription
+--     that took. A take whose rmw layer failed does not count, although upper layers may report it.
+--     Nor does a take of the middleware itself. It has no rcl layer, although rcl takes are traced.
+--     Its reader belongs to no rcl subscription, and never had an rcl layer. The subscription is
+--     the one of the rmw handle or ring buffer that was initialised last before the take; NULL
+--     where that was not traced. Of a ring buffer it may be known to which subscription object it
+--     belongs (`is_known`), but not to which subscription. The buffer that a transient-local
+--     publisher keeps belongs to none.
 -- grain: one row per successful take, or dequeue
 -- when: raw.ros2_rmw_take, raw.ros2_rcl_take, raw.ros2_rclcpp_take,
 --     raw.ros2_dispatch_subscription_callback, raw.ros2_rclcpp_ring_buffer_dequeue,

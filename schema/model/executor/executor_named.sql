@@ -12,7 +12,8 @@ WITH constructed AS (
     FROM staging.located('raw.ros2_caret_construct_static_executor')
 ),
 used AS (
-    SELECT event_id, process_id, executor_addr FROM staging.located('raw.ros2_caret_add_callback_group')
+    SELECT event_id, process_id, executor_addr
+    FROM staging.located('raw.ros2_caret_add_callback_group')
     UNION ALL
     SELECT event_id, process_id, executor_addr
     FROM staging.located('raw.ros2_caret_executor_entity_collector_to_executor')

@@ -2,7 +2,7 @@
 --     a row without a name. Nodes of several processes may have one name at a time (two robots, two
 --     domains): behind it stands the host then, or the process, or both.
 -- grain: one row per ROS node
--- when: staging.object_node
+-- when: raw.ros2_rcl_node_init, staging.object_node
 WITH every_node AS (
     SELECT
         event_id, process_id,

@@ -5,8 +5,6 @@
 -- when: staging.thread
 
 -- `process` numbers what has the same ids.
--- when: raw.cpu_return, raw.ros2_rmw_publisher_init, raw.ros2_rmw_subscription_init
--- columns: thread_index INTEGER, host_id BIGINT, pid_ns BIGINT, vpid INTEGER, process BIGINT
 CREATE OR REPLACE TEMP TABLE id_thread AS
 SELECT DISTINCT
     thread_index, host_id, pid_ns, vpid,
