@@ -99,7 +99,8 @@ _DEFAULT = r"(?: += +(?P<default>'(?:[^']|'')*'|\[[^\]]*\]|[^'\s\[]\S*))?"
 _PARAM = re.compile(rf"{_NAME} +{_TYPE}{_CHOICES}{_DEFAULT}(?P<gap> +)(?P<description>\S.*)")
 _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<description>\S.*)")
 _STEP = re.compile(
-    r"(?:-- when: (?P<when>.*?)\n-- columns: (?P<columns>[^\n]*(?:\n-- {4,}[^\n]*)*)\n|--[^\n]*\n)*?"
+    r"(?:-- when: (?P<when>.*?)\n"
+    r"-- columns: (?P<columns>[^\n]*(?:\n-- {4,}[^\n]*)*)\n|--[^\n]*\n)*?"
     r"CREATE OR REPLACE TEMP TABLE (?P<table>[a-z_]+) AS\n.*?;\n+",
     re.DOTALL,
 )
