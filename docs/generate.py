@@ -4,7 +4,7 @@ store.sql comes from the tables in `msgflow/db/tables`, data-model.md from it an
 of the other public views, queries.md and the pages in queries/ from the headers of the named
 queries, the end of trust.md from those of findings. What the examples of queries print stays;
 `python docs/examples.py` writes it anew. `schema/model.sql` is what DuckDB makes of the statements
-in `schema/alignment`, `model` and `kernel`. A test keeps all equal to their sources.
+in `schema/alignment`, `model`, `kernel` and `arrival`. A test keeps all equal to their sources.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ MODEL = HERE.parent / "schema" / "model.sql"
 
 _MODEL = """\
 -- The tables of the model. `python docs/generate.py` writes this from `schema/alignment`,
--- `schema/model` and `schema/kernel`; do not edit.
+-- `schema/model`, `schema/kernel` and `schema/arrival`; do not edit.
 -- An ingest makes those with it that cannot have a row in a recording.
 
 """

@@ -1,5 +1,6 @@
 -- What an ingest reads, besides the events: these have a table of `raw` for each tracepoint, as
--- `msgflow/ingest/tracepoints.toml` says. Then `schema/alignment`, `model` and `kernel` add theirs.
+-- `msgflow/ingest/tracepoints.toml` says. Then `schema/alignment`, `model`, `kernel` and `arrival`
+-- add theirs.
 
 -- Packets, as the reader has them.
 CREATE TABLE raw.packet (trace_index INTEGER, stream_index INTEGER, stream_class_id BIGINT,

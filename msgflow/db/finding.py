@@ -126,7 +126,7 @@ def short_name(header: Header) -> str:
 
 def composed(layer: str) -> tuple[Header, ...]:
     """Return the objects of a layer of `schema/` that are made of all kinds of findings."""
-    if layer == "model":
+    if layer == "arrival":
         name, grain = "staging.finding", "one row per place"
         description = "What was found in the input while it was read and the model was built."
         body = statement(kinds_of("input"))

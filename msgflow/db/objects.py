@@ -29,9 +29,12 @@ if TYPE_CHECKING:
 PUBLIC = "public"
 # Findings, of whose headers a view is made.
 HEALTH = "health"
-# Folders whose objects are made of staged events: which clock a kernel trace is of, all that any
-# recording tells, and what kernel traces tell besides.
-MODEL_LAYERS = ("alignment", "model", "kernel")
+# Folders whose objects are made of staged events, each a pass over what those before it made: which
+# clock a kernel trace is of, all that any recording tells, what kernel traces tell besides, and
+# what follows from all of these.
+MODEL_LAYERS = ("alignment", "model", "kernel", "arrival")
+# Passes for recordings with a kernel trace. Elsewhere their tables are empty.
+KERNEL_LAYERS = ("alignment", "kernel")
 VIEW_LAYERS = ("link", "clock", "delivery", "flow", "stat", PUBLIC)
 
 # Modules that make tables and views besides `schema/`; the hash reads them as text.
@@ -83,7 +86,7 @@ def sources(by_name: Mapping[str, Header], name: str) -> list[str]:
 @cache
 def model() -> tuple[Header, ...]:
     """Return all that an ingest makes of staged events, in the order of creation."""
-    return sort(header for layer in MODEL_LAYERS for header in load(layer))
+    return tuple(header for layer in MODEL_LAYERS for header in load(layer))
 
 
 @cache

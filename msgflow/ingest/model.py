@@ -1,15 +1,16 @@
-"""The model of a run: executes `schema/model`, from staged events to rows with ids from 1.
+"""The model of a run: from staged events to rows with ids from 1, in four passes.
 
-Before it comes `schema/alignment`, and after it `schema/kernel`. These two have rows only where a
-kernel trace was read. What cannot have a row in this recording is not planned: `schema/model.sql`
-has its empty table.
+`schema/alignment` and `schema/kernel` run only where a kernel trace was read; elsewhere their
+tables are empty. `schema/model` runs between them, on every recording, and `schema/arrival` after
+all. What cannot have a row in this recording is not planned: `schema/model.sql` has its empty
+table.
 """
 
 from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import duckdb
@@ -21,7 +22,7 @@ from msgflow.files.resources import resource_directory
 from msgflow.ingest import staging
 from msgflow.ingest.caret_initialisation import restore
 from msgflow.ingest.catalogue import load
-from msgflow.sql.header import Header
+from msgflow.sql.header import Header, Step
 from msgflow.sql.statement import with_rows
 
 _FINDING = "staging.finding"
@@ -30,13 +31,19 @@ _TABLE = re.compile(r"CREATE TABLE ([a-z_.]+) \([^;]*;")
 
 def build(con: duckdb.DuckDBPyConnection, *, keep: bool = False, findings: bool = True) -> None:
     """Create every object of these folders, each from those before it."""
-    headers = objects.model()
-    if not findings:
-        headers = tuple(header for header in headers if header.name != _FINDING)
     empty = staging.empty_tables(con)
     if any([restore(con, empty), translate(con, empty)]):
         empty = staging.empty_tables(con)
     staging.narrow(con, empty)
+    headers: list[Header] = []
+    for layer in objects.MODEL_LAYERS:
+        if layer in objects.KERNEL_LAYERS and not _has_kernel_trace(empty):
+            for header in objects.load(layer):
+                _create_empty(con, header, empty)
+        else:
+            headers += objects.load(layer)
+    if not findings:
+        headers = [header for header in headers if header.name != _FINDING]
     last_uses = {} if keep else _last_uses(headers)
     for position, header in enumerate(headers):
         create(con, header, empty)
@@ -55,10 +62,13 @@ def translate(con: duckdb.DuckDBPyConnection, empty: Collection[str]) -> bool:
     return True
 
 
-def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> None:
+def create(
+    con: duckdb.DuckDBPyConnection, header: Header, empty: set[str], *, keep: bool = False
+) -> None:
     """Create an object of the model, after all that it needs.
 
-    `empty` names the tables that exist and have no row. This function keeps it up to date.
+    `empty` names the tables that exist and have no row. This function keeps it up to date. Tables
+    of steps are dropped, unless a test wants to see them.
     """
     if header.name == _FINDING:
         found = kinds_with_rows(con, "input", {}, empty=empty)
@@ -67,25 +77,54 @@ def create(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> N
         con.execute(header.body)
     elif header.kind == "inline":
         con.execute(f"CREATE OR REPLACE VIEW {header.name} AS\n{header.body}")
-    elif not may_have_rows(con, header, empty):
-        if header.name not in empty:
-            con.execute(_empty_tables()[header.name])
-            empty.add(header.name)
+    elif not may_have_rows(con, header.sources, empty):
+        _create_empty(con, header, empty)
     else:
+        for step in header.steps:
+            _create_step(con, step, empty)
         table = f"CREATE OR REPLACE TABLE {header.name} AS\n{header.body}"
-        ((count,),) = con.execute(table).fetchall()
-        if count:
-            empty.discard(header.name)
-        else:
-            empty.add(header.name)
+        _note(con, header.name, table, empty)
+        for step in () if keep else header.steps:
+            con.execute(f"DROP TABLE temp.{step.table}")
 
 
-def may_have_rows(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> bool:
-    """Tell whether an object may have a row, by what `when` of its header says."""
-    return not header.sources or any(
+def may_have_rows(
+    con: duckdb.DuckDBPyConnection, sources: Sequence[tuple[str, str]], empty: Collection[str]
+) -> bool:
+    """Tell whether an object or a step may have a row, by what `when` of it says."""
+    return not sources or any(
         name not in empty and (not condition or with_rows(con, [(name, condition)], {}))
-        for name, condition in header.sources
+        for name, condition in sources
     )
+
+
+def _create_step(con: duckdb.DuckDBPyConnection, step: Step, empty: set[str]) -> None:
+    """Create a table that only the statements below it read."""
+    if may_have_rows(con, step.sources, empty):
+        _note(con, step.table, step.sql, empty)
+    else:
+        con.execute(f"CREATE OR REPLACE TEMP TABLE {step.table} ({step.columns})")
+        empty.add(step.table)
+
+
+def _note(con: duckdb.DuckDBPyConnection, name: str, table: str, empty: set[str]) -> None:
+    """Create a table with rows, and note whether it has any."""
+    ((count,),) = con.execute(table).fetchall()
+    if count:
+        empty.discard(name)
+    else:
+        empty.add(name)
+
+
+def _create_empty(con: duckdb.DuckDBPyConnection, header: Header, empty: set[str]) -> None:
+    if header.kind == "view" and header.name not in empty:
+        con.execute(_empty_tables()[header.name])
+        empty.add(header.name)
+
+
+def _has_kernel_trace(empty: Collection[str]) -> bool:
+    tables = {f"raw.{each.table}" for each in load().staged.values() if each.is_kernel}
+    return not tables <= set(empty)
 
 
 @functools.cache
@@ -95,7 +134,7 @@ def _empty_tables() -> Mapping[str, str]:
     return {match[1]: match[0] for match in _TABLE.finditer(text)}
 
 
-def _last_uses(headers: tuple[Header, ...]) -> dict[str, int]:
+def _last_uses(headers: Sequence[Header]) -> dict[str, int]:
     """Return the position of the last object that needs a table: of each, built or read.
 
     Tables that `store` copies, and what they need at that moment, are not in it.
@@ -121,7 +160,7 @@ def _needs(header: Header) -> frozenset[str]:
     """Return what an object needs, with the tables of `raw` one by one."""
     if staging.OF_ALL_EVENTS & set(header.needs):
         return frozenset(header.needs) | _raw_tables()
-    words = re.findall(r"\w+", header.body)
+    words = re.findall(r"\w+", "\n".join(header.statements))
     return frozenset(header.needs) | {f"raw.{word}" for word in words} & _raw_tables()
 
 

@@ -65,10 +65,12 @@ Outside of `schema/public`, what most statements take needs no declaration: the 
 ns, without its end; `origin_ns`, the moment from which times of pages count.
 
 The tables that a statement looks up stay in memory until it ends. A query may therefore go in
-steps: other statements stand before its own, each of the form
-`CREATE OR REPLACE TEMP TABLE name AS SELECT …;`. A line `-- when: main.a, main.b` above one names
-what it has its rows from, as in the header: where that has no row, the table is empty, and DuckDB
-does not look at the SQL. The line below says which columns it has: `-- columns: a_id BIGINT`.
+steps, as may an object of the model: other statements stand before its own, each of the form
+`CREATE OR REPLACE TEMP TABLE name AS SELECT …;`. Nothing else reads these tables. A line
+`-- when: main.a, main.b` above one names what it has its rows from, as in the header: where that
+has no row, the table is empty, and DuckDB does not look at the SQL. The line below says which
+columns it has: `-- columns: a_id BIGINT`. Both may be continued, and of other steps the first ones
+stand in front.
 
 What few recordings have may stand behind `WHERE $has_kernel`, or another name of RECORDED
 (`msgflow.sql.statement`). DuckDB plans nothing for it where no recording has any.
@@ -97,7 +99,8 @@ _DEFAULT = r"(?: += +(?P<default>'(?:[^']|'')*'|\[[^\]]*\]|[^'\s\[]\S*))?"
 _PARAM = re.compile(rf"{_NAME} +{_TYPE}{_CHOICES}{_DEFAULT}(?P<gap> +)(?P<description>\S.*)")
 _COLUMN = re.compile(rf"{_NAME} +{_TYPE}(?: +\[(?P<unit>[^\]]+)\])? +(?P<description>\S.*)")
 _STEP = re.compile(
-    r"(?:-- when: (?P<when>[^\n]*)\n-- columns: (?P<columns>[^\n]*)\n|--[^\n]*\n)*"
+    r"(?:-- when: (?P<when>.*?)\n"
+    r"-- columns: (?P<columns>[^\n]*(?:\n-- {4,}[^\n]*)*)\n|--[^\n]*\n)*?"
     r"CREATE OR REPLACE TEMP TABLE (?P<table>[a-z_]+) AS\n.*?;\n+",
     re.DOTALL,
 )
@@ -114,6 +117,7 @@ SCHEMAS = {
     "alignment": "staging",
     "model": "staging",
     "kernel": "staging",
+    "arrival": "staging",
     "overlap": "overlap",
     "link": "derive",
     "clock": "derive",
@@ -338,10 +342,14 @@ def _split(text: str, path: Path) -> tuple[list[_Field], str]:
 def _steps(body: str) -> tuple[tuple[Step, ...], str]:
     steps: list[Step] = []
     while match := _STEP.match(body):
-        sources, columns = _sources(match["when"] or ""), match["columns"] or ""
+        sources, columns = _sources(_joined(match["when"])), _joined(match["columns"])
         steps.append(Step(match["table"], match[0].rstrip(), sources, columns))
         body = body[match.end() :]
     return tuple(steps), body
+
+
+def _joined(value: str | None) -> str:
+    return re.sub(r"\n-- +", " ", value or "")
 
 
 def _code(text: str) -> str:

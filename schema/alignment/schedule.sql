@@ -5,7 +5,9 @@
 --     where it does so at nearly all, the few others may agree by chance. With the right clock all
 --     events agree. 5 us beside it 2 to 47 % do not, but candidates are much further apart. Events
 --     are counted, those that agree, and those at which the kernel trace contradicts itself
---     (`unknown_count`). `shift_ns` has to be added to its times.
+--     (`unknown_count`). `shift_ns` has to be added to its times. A trace is placed at this clock,
+--     and at the host of that name there, unless it names a clock that a ROS process has. One of
+--     perf that no schedule proves is of the only clock there is.
 -- grain: one row per kernel trace with switches
 -- when: staging.schedule_candidate
 WITH thread AS (
@@ -87,22 +89,47 @@ agreement AS (
         sum(unknown_count)::BIGINT AS unknown_count
     FROM most
     GROUP BY ALL
+),
+best AS (
+    SELECT
+        c.candidate_number, c.trace_index, c.clock_key, c.shift_ns,
+        coalesce(a.event_count, 0) AS event_count,
+        coalesce(a.agreeing_count, 0) AS agreeing_count,
+        coalesce(a.unknown_count, 0) AS unknown_count,
+        coalesce(
+            a.event_count >= 0.05 * (a.event_count + a.unknown_count)
+            AND a.agreeing_count >= 0.95 * a.event_count,
+            false
+        ) AS is_joined,
+        c.has_cpus
+    FROM staging.schedule_candidate AS c
+    LEFT JOIN agreement AS a ON c.candidate_number = a.candidate_number
+    -- A few events agree with a wrong clock, too.
+    QUALIFY row_number() OVER (
+        PARTITION BY c.trace_index
+        ORDER BY is_joined DESC, a.agreeing_count DESC NULLS LAST, c.clock_key, abs(c.shift_ns)
+    ) = 1
+),
+placed AS (
+    SELECT
+        *,
+        is_joined OR (
+            SELECT count(DISTINCT clock_key) = 1
+            FROM staging.source
+            WHERE domain IS DISTINCT FROM 'kernel'
+        ) AS is_placed
+    FROM best
 )
 SELECT
-    c.candidate_number, c.trace_index, c.clock_key, c.shift_ns,
-    coalesce(a.event_count, 0) AS event_count,
-    coalesce(a.agreeing_count, 0) AS agreeing_count,
-    coalesce(a.unknown_count, 0) AS unknown_count,
-    coalesce(
-        a.event_count >= 0.05 * (a.event_count + a.unknown_count)
-        AND a.agreeing_count >= 0.95 * a.event_count,
-        false
-    ) AS is_joined,
-    c.has_cpus
-FROM staging.schedule_candidate AS c
-LEFT JOIN agreement AS a ON c.candidate_number = a.candidate_number
--- A few events agree with a wrong clock, too.
-QUALIFY row_number() OVER (
-    PARTITION BY c.trace_index
-    ORDER BY is_joined DESC, a.agreeing_count DESC NULLS LAST, c.clock_key, abs(c.shift_ns)
-) = 1
+    p.*,
+    CASE WHEN p.is_placed THEN p.clock_key ELSE s.clock_key END AS placed_clock_key,
+    CASE WHEN p.is_placed AND s.hostname NOT IN (
+        SELECT hostname FROM staging.source AS o WHERE o.clock_key = p.clock_key
+    ) THEN (
+        SELECT arg_min(hostname, trace_index)
+        FROM staging.source AS o
+        WHERE o.clock_key = p.clock_key AND o.domain IS DISTINCT FROM 'kernel'
+    ) ELSE s.hostname END AS placed_hostname,
+    CASE WHEN p.is_joined THEN p.shift_ns ELSE 0 END AS placed_shift_ns
+FROM placed AS p
+JOIN staging.source AS s ON p.trace_index = s.trace_index

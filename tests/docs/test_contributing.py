@@ -22,7 +22,6 @@ ROOMS = [
         "simulator",
         "schema",
         "schema/model",
-        "schema/model/callback",
         "schema/kernel",
         "schema/link",
         "schema/stat",

@@ -62,5 +62,5 @@ def test_tables_that_stay_empty_are_not_made_again(tmp_path: Path) -> None:
         ingested(con, path)
         after = identities(con)
     kept = {name for name, identity in before.items() if after[name] == identity}
-    assert {"client_event", "service_event", "annotation_event", "near_gap"} <= kept
+    assert {"client_event", "service_event", "annotation", "near_gap"} <= kept
     assert "callback" not in kept

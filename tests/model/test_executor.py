@@ -286,25 +286,5 @@ def test_threads_that_poll(system: RosSystem, analyse: Analyse) -> None:
         for timeout in each:
             system.add("ros2:rclcpp_executor_wait_for_work", Thread(100, tid), timeout=timeout)
     assert analyse(system).rows(
-        "SELECT t.tid, p.polls, p.waits FROM staging.executor_polled AS p "
-        "JOIN staging.thread AS t USING (thread_id)"
-    ) == [(101, 2, 3)]
-
-
-@pytest.mark.parametrize(
-    ("first", "second", "thread"),
-    [
-        pytest.param([0, 0], [0], 1, id="in_the_first_life"),
-        pytest.param([], [0, 0, 0], 2, id="in_the_second"),
-    ],
-)
-def test_a_thread_that_polls_is_that_of_its_first_wait(
-    system: RosSystem, analyse: Analyse, first: list[int], second: list[int], thread: int
-) -> None:
-    for timeouts in (first, second):
-        system.context(MAIN)
-        for timeout in timeouts:
-            system.add("ros2:rclcpp_executor_wait_for_work", MAIN, timeout=timeout)
-    assert analyse(system).rows("SELECT thread_id, polls, waits FROM staging.executor_polled") == [
-        (thread, 3, 3)
-    ]
+        "SELECT count, detail FROM finding WHERE name = 'polled_executor'"
+    ) == [(2, "polled 2 times, of 3 waits in all")]

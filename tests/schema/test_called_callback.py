@@ -12,7 +12,7 @@ STAGE = """
 CREATE SCHEMA staging;
 CREATE TABLE staging.service_event AS
     SELECT 10 AS event_id, true AS is_request, 1 AS service_event_id;
-CREATE TABLE staging.callback_pair AS
+CREATE TABLE staging.callback_run AS
     SELECT 20 AS start_event_id, 1 AS process_id, 7 AS callback_handle, 10 AS previous_event_id,
         NULL::INTEGER AS previous_executor_event_id,
         false AS is_intra_process;
@@ -21,7 +21,8 @@ CREATE TABLE staging.callback_known AS
         1 AS service_event_id, NULL::INTEGER AS subscription_event_id;
 CREATE TABLE staging.take_chain (start_event_id INTEGER, end_event_id INTEGER, method VARCHAR,
     subscription_event_id INTEGER);
-CREATE TABLE staging.callback_step (start_event_id INTEGER, request_event_id INTEGER);
+CREATE TEMP TABLE callback_step (start_event_id INTEGER, request_event_id INTEGER,
+    call_event_id INTEGER, response_event_id INTEGER);
 CREATE MACRO staging.with_latest(uses, objects) AS TABLE
     SELECT u.*, o.event_id AS object_event_id
     FROM query_table(uses) AS u
@@ -39,10 +40,10 @@ def staged() -> Iterator[duckdb.DuckDBPyConnection]:
 @pytest.mark.parametrize(
     ("change", "is_called"),
     [
-        ("callback_pair SET previous_executor_event_id = 9", True),
-        ("callback_pair SET previous_executor_event_id = 11", False),
-        ("callback_pair SET previous_event_id = 11", False),
-        ("callback_pair SET is_intra_process = true", False),
+        ("callback_run SET previous_executor_event_id = 9", True),
+        ("callback_run SET previous_executor_event_id = 11", False),
+        ("callback_run SET previous_event_id = 11", False),
+        ("callback_run SET is_intra_process = true", False),
         ("callback_known SET kind = 'unknown'", True),
         ("callback_known SET kind = NULL", True),
         ("callback_known SET kind = 'timer'", False),

@@ -13,16 +13,15 @@ from rules import modelled
 STAGE = """
 CREATE SCHEMA staging;
 CREATE SCHEMA raw;
-CREATE TABLE staging.callback_owner_announced AS
-    SELECT 1 AS process_id, unnest([7, 6]) AS callback_handle, NULL::INTEGER AS callback_event_id,
+CREATE TEMP TABLE callback_announced AS
+    SELECT 1 AS process_id, unnest([7, 6]) AS callback_event_id,
         unnest([70, 60]) AS handle, NULL::VARCHAR AS kind, unnest([100, 900]) AS start_event_id,
         NULL::INTEGER AS owner_event_id, false AS is_disputed, true AS has_takes,
         true AS has_executions, true AS has_requests;
 CREATE TABLE staging.callback_known (event_id INTEGER, process_id INTEGER, callback_handle INTEGER,
     kind VARCHAR, service_event_id INTEGER, service_handle INTEGER);
-CREATE TABLE staging.callback_owner_trigger AS
-    SELECT 100 AS start_event_id, 1 AS process_id, 1 AS thread_id, 7 AS callback_handle,
-        NULL::INTEGER AS callback_event_id;
+CREATE TEMP TABLE callback_trigger AS
+    SELECT 100 AS start_event_id, 1 AS process_id, 1 AS thread_id, 7 AS callback_event_id;
 CREATE TABLE staging.callback_run (start_event_id INTEGER, callback_handle INTEGER,
     previous_event_id INTEGER, executor_event_id INTEGER, process_id INTEGER DEFAULT 1,
     thread_id INTEGER DEFAULT 1, depth INTEGER DEFAULT 1, is_intra_process BOOLEAN DEFAULT false);
@@ -39,7 +38,7 @@ CREATE MACRO staging.located(tracepoint) AS TABLE FROM waited;
 """
 NO_WAIT = "DELETE FROM waited"
 NO_TAKE = "UPDATE staging.callback_binding SET take_event_id = NULL WHERE start_event_id = 200"
-ANNOUNCED = "UPDATE staging.callback_owner_announced SET"
+ANNOUNCED = "UPDATE callback_announced SET"
 SERVED = "UPDATE staging.callback_run SET"
 
 
@@ -70,9 +69,9 @@ def staged() -> Iterator[duckdb.DuckDBPyConnection]:
             [NO_WAIT, "UPDATE staging.callback_binding SET take_event_id = NULL, kind = 'timer'"],
             False,
         ),
-        ([NO_WAIT, f"{ANNOUNCED} handle = NULL WHERE callback_handle = 7"], False),
-        ([NO_WAIT, f"{ANNOUNCED} kind = 'timer' WHERE callback_handle = 7"], False),
-        ([NO_WAIT, f"{ANNOUNCED} callback_event_id = 5 WHERE callback_handle = 7"], False),
+        ([NO_WAIT, f"{ANNOUNCED} handle = NULL WHERE callback_event_id = 7"], False),
+        ([NO_WAIT, f"{ANNOUNCED} kind = 'timer' WHERE callback_event_id = 7"], False),
+        ([NO_WAIT, f"{ANNOUNCED} callback_event_id = 5 WHERE callback_event_id = 7"], False),
         (
             [
                 NO_WAIT,
@@ -84,7 +83,7 @@ def staged() -> Iterator[duckdb.DuckDBPyConnection]:
             False,
         ),
         # A subscription runs without a take.
-        ([f"{ANNOUNCED} kind = 'subscription' WHERE callback_handle = 7"], True),
+        ([f"{ANNOUNCED} kind = 'subscription' WHERE callback_event_id = 7"], True),
         ([NO_TAKE, f"{SERVED} previous_event_id = 150 WHERE start_event_id = 200"], True),
         ([NO_TAKE, f"{SERVED} previous_event_id = NULL WHERE start_event_id = 200"], True),
         ([NO_TAKE], False),
@@ -109,7 +108,7 @@ def staged() -> Iterator[duckdb.DuckDBPyConnection]:
             [
                 NO_TAKE,
                 f"{SERVED} previous_event_id = 150 WHERE start_event_id = 200",
-                "DELETE FROM staging.callback_owner_trigger",
+                "DELETE FROM callback_trigger",
             ],
             False,
         ),
@@ -121,6 +120,6 @@ def test_messages_reach_callbacks_although_none_is_taken(
     for change in changes:
         staged.execute(change)
     timers = staged.execute(
-        "SELECT process_id FROM owned WHERE callback_handle = 6 AND kind = 'timer'"
+        "SELECT process_id FROM owned WHERE callback_event_id = 6 AND kind = 'timer'"
     ).fetchall()
     assert timers == [(1,)] * (not is_found)

@@ -55,7 +55,7 @@ INTERNAL = [file for file in FILES if file.layer == "internal"]
 PAGE_QUERIES = [page_query(path.stem) for path in sorted(DIRECTORY.glob("*.sql"))]
 LAYER_OF = {file.header.name: file.layer for file in FILES}
 LAYER_OF |= {
-    header.name: layer for layer in ("model", "stat", "public") for header in objects.load(layer)
+    header.name: layer for layer in ("arrival", "stat", "public") for header in objects.load(layer)
 }
 
 

@@ -43,7 +43,7 @@ def derived(stage: str, names: Collection[str], tables: Mapping[str, str] | None
 def modelled(stage: str, name: str, view: str) -> Rules:
     """A connection with what `stage` makes, and a relation of the model above it as `view`."""
     (rule,) = (each for each in objects.model() if each.name == f"staging.{name}")
-    return _as_made(stage, f"CREATE VIEW {view} AS {rule.body}")
+    return _as_made(stage, f"CREATE TEMP VIEW {view} AS {rule.body}")
 
 
 def insert(

@@ -6,12 +6,12 @@
 -- cure: None needed.
 -- grain: one row per process with such callbacks
 -- severity: info
--- when: staging.agnocast_run
+-- when: staging.callback_run WHERE is_agnocast
 SELECT
     l.label AS subject,
     count(*) AS count,
     printf('%d callbacks on %d threads', count(*), count(DISTINCT p.thread_id)) AS detail
-FROM staging.callback_pair AS p
-JOIN staging.agnocast_run AS a ON p.start_event_id = a.start_event_id
+FROM staging.callback_run AS p
 JOIN process_label AS l ON p.process_id = l.process_id
+WHERE p.is_agnocast
 GROUP BY p.process_id, l.label

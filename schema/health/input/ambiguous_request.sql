@@ -13,7 +13,7 @@ WITH ambiguous_request AS (
     JOIN staging.client_gid AS g ON t.gid = g.gid
     JOIN staging.client_event AS s
         ON g.client_event_id = s.client_event_id AND t.sequence_number = s.sequence_number
-    ANTI JOIN staging.request_pair AS p ON t.event_id = p.take_event_id
+    ANTI JOIN staging.exchange AS p ON t.event_id = p.event_at_service
     WHERE t.is_request AND s.is_request
 )
 SELECT

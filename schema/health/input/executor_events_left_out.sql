@@ -7,13 +7,16 @@
 -- cure: Record all three events where it matters what executors do.
 -- grain: one row per process with such threads
 -- severity: warning
--- when: staging.executor_undelimited, staging.executor_named
+-- when: staging.executor_first WHERE is_undelimited, staging.executor_named
 WITH left_out AS (
-    SELECT process_id, thread_id FROM staging.executor_undelimited
+    SELECT t.process_id, f.thread_id
+    FROM staging.executor_first AS f
+    JOIN staging.thread AS t ON f.thread_id = t.thread_id
+    WHERE f.is_undelimited
     UNION
     -- CARET names the kind of the executor. These kinds have events.
     SELECT p.process_id, p.thread_id
-    FROM staging.callback_pair AS p
+    FROM staging.callback_run AS p
     ANTI JOIN staging.executor_first AS f ON p.thread_id = f.thread_id
     WHERE p.process_id IN (SELECT process_id FROM staging.executor_named WHERE kind IN (
         'single_threaded_executor', 'multi_threaded_executor'

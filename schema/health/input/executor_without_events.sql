@@ -11,22 +11,22 @@
 -- cure: None needed. For executor states, use a SingleThreadedExecutor or MultiThreadedExecutor.
 -- grain: one row per process with such threads
 -- severity: warning
--- when: staging.callback_pair WHERE thread_id NOT IN (SELECT thread_id FROM staging.executor_first)
+-- when: staging.callback_run WHERE thread_id NOT IN (SELECT thread_id FROM staging.executor_first)
 WITH enabled AS (
     SELECT trace_index FROM staging.declared WHERE name = 'ros2:rclcpp_executor_get_next_ready'
 ),
 silent AS (
     SELECT p.process_id, p.thread_id, count(*) AS number
-    FROM staging.callback_pair AS p
+    FROM staging.callback_run AS p
     SEMI JOIN enabled AS e ON p.trace_index = e.trace_index
     ANTI JOIN staging.executor_first AS x ON p.thread_id = x.thread_id
     ANTI JOIN staging.thread_break AS b ON p.thread_id = b.thread_id
-    ANTI JOIN staging.executor_in_order AS o ON p.thread_id = o.thread_id
-    ANTI JOIN staging.agnocast_run AS a ON p.start_event_id = a.start_event_id
+    ANTI JOIN (FROM staging.queued_message WHERE is_in_order) AS o ON p.thread_id = o.thread_id
     -- Of these the recording left the events out.
     ANTI JOIN (SELECT process_id FROM staging.executor_named WHERE kind IN (
         'single_threaded_executor', 'multi_threaded_executor'
     )) AS n ON p.process_id = n.process_id
+    WHERE NOT p.is_agnocast
     GROUP BY p.process_id, p.thread_id, p.trace_index
     -- An executor chose the first one before the recording began, perhaps. It would have said so
     -- before the next.
@@ -34,7 +34,7 @@ silent AS (
 ),
 running AS (
     SELECT process_id, count(DISTINCT thread_id) AS threads
-    FROM staging.callback_pair
+    FROM staging.callback_run
     WHERE process_id IN (SELECT process_id FROM silent)
     GROUP BY process_id
 )

@@ -7,13 +7,16 @@
 -- cure: None needed. Where messages wait for the loop, let the executor spin.
 -- grain: one row per process
 -- severity: warning
--- when: staging.executor_polled
+-- when: staging.executor_first WHERE polls > 1
 SELECT
     l.label AS subject,
-    sum(p.polls)::BIGINT AS count,
+    sum(f.polls)::BIGINT AS count,
     printf(
-        'polled %d times, of %d waits in all', sum(p.polls)::BIGINT, sum(p.waits)::BIGINT
+        'polled %d times, of %d waits in all', sum(f.polls)::BIGINT, sum(f.waits)::BIGINT
     ) AS detail
-FROM staging.executor_polled AS p
-JOIN process_label AS l ON p.process_id = l.process_id
-GROUP BY p.process_id, l.label
+FROM staging.executor_first AS f
+JOIN staging.thread AS t ON f.thread_id = t.thread_id
+JOIN process_label AS l ON t.process_id = l.process_id
+-- Any program may poll once before it spins.
+WHERE f.polls > 1 AND 2 * f.polls > f.waits
+GROUP BY t.process_id, l.label

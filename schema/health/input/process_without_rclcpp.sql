@@ -21,7 +21,7 @@ rclcpp AS (
         SELECT process_id FROM staging.process WHERE python_version IS NOT NULL
     )
     UNION
-    SELECT process_id FROM staging.callback_pair
+    SELECT process_id FROM staging.callback_run
     UNION
     SELECT t.process_id
     FROM staging.thread AS t

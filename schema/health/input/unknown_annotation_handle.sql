@@ -15,5 +15,5 @@ SELECT
 FROM staging.annotation AS a
 JOIN staging.annotation_object AS o ON a.event_id = o.event_id
 JOIN process_label AS l ON a.process_id = l.process_id
-WHERE o.object_id IS NULL
+WHERE o.side IS NOT NULL AND o.object_id IS NULL
 HAVING count(*) > 0

@@ -4,12 +4,11 @@
 -- cure: Start the session before the nodes, and see whether events were lost (msgflow check).
 -- grain: one row per trace
 -- severity: warning
--- when: staging.callback_pair_left_over
+-- when: staging.callback_end_alone
 SELECT
     trace_index + 1 AS trace_id,
     count(*) AS count,
     'ends of callbacks without a start: tracing started inside a callback, or events were lost'
         AS detail
-FROM staging.callback_pair_left_over
-WHERE NOT is_start AND partner_event_id IS NULL
+FROM staging.callback_end_alone
 GROUP BY trace_index

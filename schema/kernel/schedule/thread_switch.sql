@@ -46,7 +46,7 @@ FROM staging.schedule_moment AS m
 JOIN staging.schedule AS s ON m.candidate_number = s.candidate_number
 JOIN switch AS w ON m.contradiction_id = w.event_id
 JOIN unseen AS u ON m.contradiction_id = u.event_id
-JOIN staging.context AS x
+JOIN staging.thread AS x
     ON m.thread_index = x.thread_index
     AND m.event_id >= x.from_event_id
     AND m.event_id < x.until_event_id

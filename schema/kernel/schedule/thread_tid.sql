@@ -9,7 +9,7 @@ WITH ran AS (
         min(m.at_ns + s.shift_ns) AS first_ns, max(m.at_ns + s.shift_ns) AS last_ns
     FROM staging.schedule_moment AS m
     JOIN staging.schedule AS s ON m.candidate_number = s.candidate_number
-    JOIN staging.context AS x
+    JOIN staging.thread AS x
         ON m.thread_index = x.thread_index
         AND m.event_id >= x.from_event_id
         AND m.event_id < x.until_event_id

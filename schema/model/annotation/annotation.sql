@@ -1,17 +1,16 @@
 -- description: Indirect links that the application declared, numbered as they were first. Those of
 --     a process with equal kind, inputs and outputs are one.
 -- grain: one row per declared indirect link
--- when: staging.annotation_event
+-- when: staging.annotation_object
 WITH meant AS (
     SELECT
-        e.event_id, e.process_id, e.kind,
+        event_id, process_id, kind,
         list_sort(
-            list(DISTINCT o.side || coalesce(o.object_id::VARCHAR, printf(' %x', o.handle)))
-            FILTER (WHERE o.event_id IS NOT NULL)
+            list(DISTINCT side || coalesce(object_id::VARCHAR, printf(' %x', handle)))
+            FILTER (WHERE side IS NOT NULL)
         ) AS objects
-    FROM staging.annotation_event AS e
-    LEFT JOIN staging.annotation_object AS o ON e.event_id = o.event_id
-    GROUP BY e.event_id, e.process_id, e.kind
+    FROM staging.annotation_object
+    GROUP BY event_id, process_id, kind
 )
 SELECT
     row_number() OVER (ORDER BY min(event_id)) AS annotation_id,

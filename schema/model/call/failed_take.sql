@@ -3,7 +3,7 @@
 -- when: raw.ros2_rmw_take
 WITH failed AS (
     SELECT event_id, ts_ns, trace_index, thread_id, process_id, rmw_subscription_handle
-    FROM staging.located('ros2_rmw_take')
+    FROM staging.located('raw.ros2_rmw_take')
     WHERE taken = 0
 )
 SELECT

@@ -15,54 +15,37 @@ WITH call AS NOT MATERIALIZED (
 rcl_publisher AS (
     SELECT event_id, process_id, publisher_handle AS handle FROM staging.publisher_known
 ),
-rmw_publisher AS (SELECT event_id, process_id, rmw_handle AS handle FROM staging.publisher_known),
-dds_writer AS (SELECT event_id, process_id, writer AS handle FROM staging.publisher_known),
-by_rcl AS NOT MATERIALIZED (SELECT * FROM staging.with_latest('call', 'rcl_publisher')),
--- Few, as a rule, which are looked at twice.
-not_by_rcl AS MATERIALIZED (
-    SELECT
-        event_id, process_id, rmw_handle AS handle, writer, handle AS publisher_handle,
-        may_be_rosout
-    FROM by_rcl
-    WHERE object_event_id IS NULL
-),
-by_rmw AS MATERIALIZED (
-    SELECT
-        event_id, process_id, writer AS handle, publisher_handle, may_be_rosout,
-        object_event_id AS rmw_event_id
-    FROM staging.with_latest('not_by_rcl', 'rmw_publisher')
-),
+by_rcl AS (SELECT * FROM staging.with_latest('call', 'rcl_publisher')),
 rosout AS (
     SELECT process_id, count(*) AS publisher_count, min(event_id) AS publisher_event_id
     FROM staging.publisher_known
     WHERE topic_name = '/rosout'
     GROUP BY process_id
 ),
-resolved AS (
+-- Few, as a rule.
+not_by_rcl AS (
     SELECT
-        w.event_id, w.process_id, w.publisher_handle,
+        c.event_id, c.process_id, c.handle,
         coalesce(
-            w.rmw_event_id, w.object_event_id,
-            CASE WHEN w.may_be_rosout AND o.publisher_count = 1 THEN o.publisher_event_id END
+            r.event_id, w.event_id,
+            CASE WHEN c.may_be_rosout AND o.publisher_count = 1 THEN o.publisher_event_id END
         ) AS publisher_event_id,
-        w.may_be_rosout AND o.publisher_count > 1 AS is_rosout
-    FROM staging.with_latest('by_rmw', 'dds_writer') AS w
-    LEFT JOIN rosout AS o ON w.process_id = o.process_id
+        coalesce(c.may_be_rosout AND o.publisher_count > 1, false) AS is_rosout
+    FROM (SELECT * FROM by_rcl WHERE object_event_id IS NULL) AS c
+    ASOF LEFT JOIN staging.publisher_known AS r
+        ON c.process_id = r.process_id AND c.rmw_handle = r.rmw_handle AND c.event_id >= r.event_id
+    ASOF LEFT JOIN staging.publisher_known AS w
+        ON c.process_id = w.process_id AND c.writer = w.writer AND c.event_id >= w.event_id
+    LEFT JOIN rosout AS o ON c.process_id = o.process_id
 ),
 published AS (
-    SELECT
-        event_id AS start_event_id,
-        NULL::BIGINT AS process_id,
-        NULL::UBIGINT AS unknown_handle,
-        object_event_id AS publisher_event_id, false AS is_rosout
+    SELECT event_id AS start_event_id, object_event_id AS publisher_event_id, false AS is_rosout
     FROM by_rcl
     WHERE object_event_id IS NOT NULL
-    UNION ALL
+    UNION ALL BY NAME
     SELECT
-        event_id, process_id,
-        CASE WHEN publisher_event_id IS NULL THEN publisher_handle END,
-        publisher_event_id,
-        coalesce(is_rosout, false)
-    FROM resolved
+        event_id AS start_event_id, publisher_event_id, is_rosout, process_id,
+        CASE WHEN publisher_event_id IS NULL THEN handle END AS unknown_handle
+    FROM not_by_rcl
 )
 SELECT *, row_number() OVER (ORDER BY start_event_id) AS publication_id FROM published

@@ -6,7 +6,13 @@
 --     raw.ros2_rclcpp_ring_buffer_dequeue, raw.ros2_rclcpp_ring_buffer_enqueue
 WITH enqueue AS (
     SELECT event_id, ts_ns, trace_index, process_id, thread_id, buffer, "index" AS slot, overwritten
-    FROM staging.located('ros2_rclcpp_ring_buffer_enqueue')
+    FROM staging.located('raw.ros2_rclcpp_ring_buffer_enqueue')
+),
+cleared AS (
+    SELECT event_id, ts_ns, trace_index, thread_index, buffer FROM raw.ros2_rclcpp_ring_buffer_clear
+    UNION ALL
+    SELECT event_id, ts_ns, trace_index, thread_index, buffer
+    FROM raw.ros2_rclcpp_construct_ring_buffer
 ),
 published AS (
     SELECT e.event_id, b.publication_id
@@ -21,21 +27,25 @@ published AS (
     WHERE e.event_id <= b.end_event_id
 )
 SELECT
-    e.trace_index + 1 AS trace_id, e.process_id, 'enqueue' AS kind, e.buffer AS buffer_handle,
-    e.slot, e.ts_ns AS at_ns, b.publication_id, NULL::BIGINT AS take_id,
-    coalesce(e.overwritten = 1, false) AS is_overwriting, e.event_id
+    e.trace_index + 1 AS trace_id,
+    e.process_id,
+    'enqueue' AS kind,
+    e.buffer AS buffer_handle,
+    e.slot,
+    e.ts_ns AS at_ns,
+    b.publication_id,
+    NULL::BIGINT AS take_id,
+    coalesce(e.overwritten = 1, false) AS is_overwriting,
+    e.event_id
 FROM enqueue AS e
 LEFT JOIN published AS b ON e.event_id = b.event_id
 UNION ALL
 SELECT
     d.trace_index + 1, d.process_id, 'dequeue', d.buffer, d."index", d.ts_ns, NULL, t.take_id,
     false, d.event_id
-FROM staging.located('ros2_rclcpp_ring_buffer_dequeue') AS d
+FROM staging.located('raw.ros2_rclcpp_ring_buffer_dequeue') AS d
 LEFT JOIN staging.take_number AS t ON d.event_id = t.start_event_id
 UNION ALL
 SELECT trace_index + 1, process_id, 'clear', buffer, NULL, ts_ns, NULL, NULL, false, event_id
-FROM staging.located('ros2_rclcpp_ring_buffer_clear')
-UNION ALL
-SELECT trace_index + 1, process_id, 'clear', buffer, NULL, ts_ns, NULL, NULL, false, event_id
-FROM staging.located('ros2_rclcpp_construct_ring_buffer')
+FROM staging.located('cleared')
 ORDER BY event_id

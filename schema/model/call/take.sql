@@ -12,7 +12,7 @@ WITH every_take AS NOT MATERIALIZED (
     SELECT
         start_event_id, start_event_id, trace_index, process_id, thread_id, start_ns, NULL,
         'callback_only'
-    FROM staging.callback_pair
+    FROM staging.callback_run
 )
 SELECT
     s.take_id,

@@ -6,11 +6,7 @@ SELECT
     n.start_event_id, n.take_id, n.callback_start_event_id,
     coalesce(s.subscription_id, p.subscription_id) AS subscription_id
 FROM staging.take_number AS n
-LEFT JOIN staging.take_inferred AS i ON n.start_event_id = i.start_event_id
-LEFT JOIN staging.subscription AS s
-    ON s.event_id = coalesce(
-        n.subscription_event_id, i.subscription_event_id, n.callback_subscription_event_id
-    )
+LEFT JOIN staging.subscription AS s ON n.subscription_event_id = s.event_id
 LEFT JOIN (
     SELECT process_id, rmw_handle, subscription_id FROM staging.subscription WHERE is_inferred
 ) AS p

@@ -2,8 +2,7 @@
 -- grain: one row per callback group and executor
 -- when: staging.callback_group_owner
 SELECT
-    row_number() OVER (ORDER BY g.event_id) AS callback_group_id,
-    g.process_id, x.executor_id,
+    g.callback_group_id, g.process_id, x.executor_id,
     coalesce(g.kind, 'unknown') AS kind,
     g.event_id
 FROM staging.callback_group_owner AS g

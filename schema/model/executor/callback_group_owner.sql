@@ -6,17 +6,17 @@
 --     raw.ros2_caret_callback_group_to_executor_entity_collector
 WITH collected AS (
     SELECT event_id, process_id, executor_addr, entities_collector_addr
-    FROM staging.located('ros2_caret_construct_static_executor')
+    FROM staging.located('raw.ros2_caret_construct_static_executor')
     UNION ALL
     SELECT event_id, process_id, executor_addr, entities_collector_addr
-    FROM staging.located('ros2_caret_executor_entity_collector_to_executor')
+    FROM staging.located('raw.ros2_caret_executor_entity_collector_to_executor')
 ),
 to_collector AS (
     SELECT event_id, process_id, callback_group_addr, group_type_name, entities_collector_addr
-    FROM staging.located('ros2_caret_add_callback_group_static_executor')
+    FROM staging.located('raw.ros2_caret_add_callback_group_static_executor')
     UNION ALL
     SELECT event_id, process_id, callback_group_addr, group_type_name, entities_collector_addr
-    FROM staging.located('ros2_caret_callback_group_to_executor_entity_collector')
+    FROM staging.located('raw.ros2_caret_callback_group_to_executor_entity_collector')
 ),
 nearest_collector AS (
     SELECT
@@ -31,7 +31,7 @@ nearest_collector AS (
 ),
 added AS (
     SELECT event_id, process_id, callback_group_addr, group_type_name, executor_addr
-    FROM staging.located('ros2_caret_add_callback_group')
+    FROM staging.located('raw.ros2_caret_add_callback_group')
     UNION ALL
     SELECT a.event_id, a.process_id, a.callback_group_addr, a.group_type_name, c.executor_addr
     FROM to_collector AS a
@@ -50,6 +50,7 @@ owned AS (
     GROUP BY a.event_id, a.process_id, a.callback_group_addr, a.group_type_name
 )
 SELECT
+    row_number() OVER (ORDER BY min(event_id)) AS callback_group_id,
     min(event_id) AS event_id,
     process_id, callback_group_addr, executor_event_id,
     arg_min(group_type_name, event_id) AS kind

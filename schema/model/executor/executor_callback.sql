@@ -6,6 +6,6 @@
 
 -- Of those behind one event, only the first has no other callback before it.
 SELECT p.executor_event_id, n.callback_instance_id
-FROM staging.callback_pair AS p
+FROM staging.callback_run AS p
 JOIN staging.callback_number AS n ON p.start_event_id = n.start_event_id
 WHERE coalesce(p.previous_callback_event_id < p.executor_event_id, p.executor_event_id IS NOT NULL)

@@ -6,16 +6,17 @@
 --     staging.python_mark WHERE kind = 'executor'
 WITH constructed AS (
     SELECT event_id, process_id, executor_addr, executor_type_name AS kind
-    FROM staging.located('ros2_caret_construct_executor')
+    FROM staging.located('raw.ros2_caret_construct_executor')
     UNION ALL
     SELECT event_id, process_id, executor_addr, executor_type_name
-    FROM staging.located('ros2_caret_construct_static_executor')
+    FROM staging.located('raw.ros2_caret_construct_static_executor')
 ),
 used AS (
-    SELECT event_id, process_id, executor_addr FROM staging.located('ros2_caret_add_callback_group')
+    SELECT event_id, process_id, executor_addr
+    FROM staging.located('raw.ros2_caret_add_callback_group')
     UNION ALL
     SELECT event_id, process_id, executor_addr
-    FROM staging.located('ros2_caret_executor_entity_collector_to_executor')
+    FROM staging.located('raw.ros2_caret_executor_entity_collector_to_executor')
 )
 SELECT event_id, process_id, executor_addr, coalesce(kind, 'unknown') AS kind FROM constructed
 UNION ALL

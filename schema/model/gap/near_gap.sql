@@ -80,11 +80,7 @@ between_the_two AS (
     WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns
 )
 SELECT
-    n.event_id, c.thread_id, n.sequence, n.ts_ns, b.event_id IS NOT NULL AS is_between,
+    n.event_id, n.thread_id, n.sequence, n.ts_ns, b.event_id IS NOT NULL AS is_between,
     b.event_id IS NOT NULL OR n.sequence = 'executor' AS is_behind
-FROM near AS n
-JOIN staging.context AS c
-    ON n.thread_index = c.thread_index
-    AND n.event_id >= c.from_event_id
-    AND n.event_id < c.until_event_id
+FROM staging.located('near') AS n
 LEFT JOIN between_the_two AS b ON n.event_id = b.event_id AND n.sequence = b.sequence

@@ -2,38 +2,25 @@
 --     a row without a name. Nodes of several processes may have one name at a time (two robots, two
 --     domains): behind it stands the host then, or the process, or both.
 -- grain: one row per ROS node
--- when: raw.ros2_rcl_node_init, staging.node_use
-WITH known AS (
+-- when: raw.ros2_rcl_node_init, staging.object_node
+WITH every_node AS (
     SELECT
-        event_id, process_id, node_name AS name, namespace,
+        event_id, process_id,
+        node_name AS name,
+        namespace,
         namespace || CASE WHEN namespace LIKE '%/' THEN '' ELSE '/' END || node_name AS full_name,
-        node_handle, ts_ns AS created_ns, false AS is_inferred
-    FROM staging.located('ros2_rcl_node_init')
-),
-unknown AS (
-    SELECT
-        min(event_id) AS event_id,
-        process_id,
-        NULL AS name,
-        NULL AS namespace,
-        NULL AS full_name,
         node_handle,
-        NULL AS created_ns,
-        true AS is_inferred
-    FROM staging.node_use
-    WHERE node_event_id IS NULL
-    GROUP BY process_id, node_handle
-),
-every_node AS (
-    SELECT event_id, process_id, name, namespace, full_name, node_handle, created_ns, is_inferred
-    FROM known
-    UNION ALL
-    SELECT event_id, process_id, name, namespace, full_name, node_handle, created_ns, is_inferred
-    FROM unknown
+        ts_ns AS created_ns,
+        false AS is_inferred
+    FROM staging.located('raw.ros2_rcl_node_init')
+    UNION ALL BY NAME
+    SELECT DISTINCT node_event_id AS event_id, process_id, node_handle, true AS is_inferred
+    FROM staging.object_node
+    WHERE is_inferred
 ),
 lived AS (
     SELECT process_id, host_id, vpid, min(first_seen_ns) AS first_ns, max(last_seen_ns) AS last_ns
-    FROM staging.context
+    FROM staging.thread
     GROUP BY process_id, host_id, vpid
 ),
 -- With the processes of all nodes of its name.

@@ -3,18 +3,16 @@
 -- grain: one row per publisher
 -- when: staging.publisher_known, staging.publication_number
 WITH every_publisher AS (
+    SELECT *, false AS is_inferred FROM staging.publisher_known
+    UNION ALL BY NAME
     SELECT
-        event_id, process_id, topic_name, publisher_handle, rmw_handle, gid, queue_depth,
-        created_ns, is_internal, false AS is_inferred, is_agnocast
-    FROM staging.publisher_known
-    UNION ALL
-    SELECT
-        min(start_event_id),
+        min(start_event_id) AS event_id,
         process_id,
-        CASE WHEN bool_and(is_rosout) THEN '/rosout' END,
-        unknown_handle, NULL, NULL, NULL, NULL,
-        bool_and(is_rosout),
-        true, false
+        CASE WHEN bool_and(is_rosout) THEN '/rosout' END AS topic_name,
+        unknown_handle AS publisher_handle,
+        bool_and(is_rosout) AS is_internal,
+        true AS is_inferred,
+        false AS is_agnocast
     FROM staging.publication_number
     WHERE unknown_handle IS NOT NULL
     GROUP BY process_id, unknown_handle

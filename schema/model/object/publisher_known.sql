@@ -6,13 +6,13 @@
 -- when: raw.ros2_rcl_publisher_init
 WITH rmw_init AS (
     SELECT event_id, ts_ns, process_id, rmw_publisher_handle, staging.gid_bytes(gid) AS gid
-    FROM staging.located('ros2_rmw_publisher_init')
+    FROM staging.located('raw.ros2_rmw_publisher_init')
 ),
 writer_init AS (
     SELECT
         event_id, ts_ns, process_id, writer, topic_name,
         staging.gid_bytes(coalesce(gid, gid_prefix || gid_entity)) AS gid
-    FROM staging.located('dds_create_writer')
+    FROM staging.located('raw.dds_create_writer')
 ),
 with_rmw AS (
     SELECT
@@ -22,7 +22,7 @@ with_rmw AS (
         CASE WHEN p.rmw_publisher_handle IS DISTINCT FROM 0 THEN 'rt' || p.topic_name END
             AS dds_topic,
         r.gid, r.ts_ns AS rmw_created_ns
-    FROM staging.located('ros2_rcl_publisher_init') AS p
+    FROM staging.located('raw.ros2_rcl_publisher_init') AS p
     ASOF LEFT JOIN rmw_init AS r
         ON p.process_id = r.process_id
         AND p.rmw_publisher_handle = r.rmw_publisher_handle

@@ -3,27 +3,17 @@
 -- grain: one row per subscription
 -- when: staging.subscription_known, staging.take_number
 WITH every_subscription AS (
+    SELECT *, false AS is_inferred FROM staging.subscription_known
+    UNION ALL BY NAME
     SELECT
-        event_id, process_id, topic_name, subscription_handle, rmw_handle, gid, queue_depth,
-        created_ns, is_internal, false AS is_inferred, is_agnocast
-    FROM staging.subscription_known
-    UNION ALL
-    SELECT
-        min(n.start_event_id), n.process_id, NULL, NULL, n.rmw_handle, NULL, NULL, NULL, false,
-        true, false
-    FROM staging.take_number AS n
-    LEFT JOIN staging.take_inferred AS i ON n.start_event_id = i.start_event_id
-    WHERE n.rmw_handle IS NOT NULL
-        AND coalesce(
-            n.subscription_event_id, i.subscription_event_id, n.callback_subscription_event_id
-        ) IS NULL
-    GROUP BY n.process_id, n.rmw_handle
-    UNION ALL
-    SELECT DISTINCT
-        subscription_event_id, process_id, NULL, NULL, NULL::UBIGINT, NULL, NULL, NULL::BIGINT,
-        false, true, false
-    FROM staging.take_inferred
-    WHERE is_inferred
+        coalesce(subscription_event_id, min(start_event_id)) AS event_id,
+        process_id, rmw_handle,
+        false AS is_internal,
+        true AS is_inferred,
+        false AS is_agnocast
+    FROM staging.take_number
+    WHERE is_inferred OR (subscription_event_id IS NULL AND rmw_handle IS NOT NULL)
+    GROUP BY subscription_event_id, process_id, rmw_handle
 )
 SELECT
     row_number() OVER (ORDER BY s.event_id) AS subscription_id,

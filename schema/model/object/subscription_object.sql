@@ -11,7 +11,7 @@ initialised AS (
     SELECT
         i.event_id, i.process_id, i.thread_id, i.subscription, c.construction_event_id,
         s.event_id AS subscription_event_id
-    FROM staging.located('ros2_rclcpp_subscription_init') AS i
+    FROM staging.located('raw.ros2_rclcpp_subscription_init') AS i
     ASOF LEFT JOIN construction AS c
         ON i.thread_id = c.thread_id AND i.event_id >= c.construction_event_id
     ASOF LEFT JOIN staging.subscription_known AS s
@@ -21,10 +21,10 @@ initialised AS (
 ),
 use AS (
     SELECT event_id, process_id, thread_id, subscription
-    FROM staging.located('ros2_rclcpp_subscription_callback_added')
+    FROM staging.located('raw.ros2_rclcpp_subscription_callback_added')
     UNION ALL
     SELECT event_id, process_id, thread_id, subscription
-    FROM staging.located('ros2_rclcpp_ipb_to_subscription')
+    FROM staging.located('raw.ros2_rclcpp_ipb_to_subscription')
 ),
 placed AS (
     SELECT u.event_id, u.process_id, u.thread_id, u.subscription, c.construction_event_id
@@ -40,22 +40,6 @@ same_construction AS (
         AND p.construction_event_id = i.construction_event_id
         AND p.subscription = i.subscription
     GROUP BY p.event_id
-),
-earlier AS (
-    SELECT p.event_id, i.subscription_event_id
-    FROM placed AS p
-    ASOF JOIN initialised AS i
-        ON p.process_id = i.process_id
-        AND p.subscription = i.subscription
-        AND p.event_id >= i.event_id
-),
-later AS (
-    SELECT p.event_id, i.subscription_event_id
-    FROM placed AS p
-    ASOF JOIN initialised AS i
-        ON p.process_id = i.process_id
-        AND p.subscription = i.subscription
-        AND p.event_id <= i.event_id
 )
 SELECT
     p.event_id,
@@ -64,5 +48,11 @@ SELECT
     ) AS subscription_event_id
 FROM placed AS p
 LEFT JOIN same_construction AS s ON p.event_id = s.event_id
-LEFT JOIN earlier AS e ON p.event_id = e.event_id
-LEFT JOIN later AS l ON p.event_id = l.event_id
+ASOF LEFT JOIN initialised AS e
+    ON p.process_id = e.process_id
+    AND p.subscription = e.subscription
+    AND p.event_id >= e.event_id
+ASOF LEFT JOIN initialised AS l
+    ON p.process_id = l.process_id
+    AND p.subscription = l.subscription
+    AND p.event_id <= l.event_id

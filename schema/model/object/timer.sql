@@ -4,9 +4,9 @@
 -- when: raw.ros2_rcl_timer_init, staging.timer_use, staging.callback_owner
 WITH every_timer AS (
     SELECT event_id, process_id, period AS period_ns, timer_handle, ts_ns AS created_ns
-    FROM staging.located('ros2_rcl_timer_init')
-    UNION ALL
-    SELECT timer_event_id, process_id, NULL, any_value(timer_handle), NULL
+    FROM staging.located('raw.ros2_rcl_timer_init')
+    UNION ALL BY NAME
+    SELECT timer_event_id AS event_id, process_id, any_value(timer_handle) AS timer_handle
     FROM (
         SELECT timer_event_id, process_id, timer_handle FROM staging.timer_use WHERE is_inferred
         UNION ALL

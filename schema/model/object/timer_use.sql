@@ -5,15 +5,15 @@
 -- when: raw.ros2_rclcpp_timer_callback_added, raw.ros2_rclcpp_timer_link_node
 WITH use AS (
     SELECT event_id, process_id, timer_handle, true AS has_callback
-    FROM staging.located('ros2_rclcpp_timer_callback_added')
+    FROM staging.located('raw.ros2_rclcpp_timer_callback_added')
     UNION ALL
     SELECT event_id, process_id, timer_handle, false
-    FROM staging.located('ros2_rclcpp_timer_link_node')
+    FROM staging.located('raw.ros2_rclcpp_timer_link_node')
 ),
 resolved AS (
     SELECT u.event_id, u.process_id, u.timer_handle, u.has_callback, i.event_id AS known_event_id
     FROM use AS u
-    ASOF LEFT JOIN staging.located('ros2_rcl_timer_init') AS i
+    ASOF LEFT JOIN staging.located('raw.ros2_rcl_timer_init') AS i
         ON u.process_id = i.process_id
         AND u.timer_handle = i.timer_handle
         AND u.event_id >= i.event_id

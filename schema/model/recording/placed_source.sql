@@ -7,12 +7,13 @@
 WITH placed AS (
     SELECT
         s.* REPLACE (
-            CASE WHEN p.trace_index IS NULL THEN s.clock_key ELSE p.clock_key END AS clock_key,
-            CASE WHEN p.trace_index IS NULL THEN s.hostname ELSE p.hostname END AS hostname
+            CASE WHEN p.trace_index IS NULL THEN s.clock_key ELSE p.placed_clock_key END
+                AS clock_key,
+            CASE WHEN p.trace_index IS NULL THEN s.hostname ELSE p.placed_hostname END AS hostname
         ),
-        CASE WHEN p.trace_index IS NULL THEN 0 ELSE p.shift_ns END AS shift_ns
+        coalesce(p.placed_shift_ns, 0) AS shift_ns
     FROM staging.source AS s
-    LEFT JOIN staging.placement AS p ON s.trace_index = p.trace_index
+    LEFT JOIN staging.schedule AS p ON s.trace_index = p.trace_index
 ),
 first AS (
     SELECT

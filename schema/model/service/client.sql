@@ -4,15 +4,14 @@
 -- when: staging.client_event, staging.client_known
 WITH learned AS (
     SELECT u.client_event_id, mode(s.service_name ORDER BY s.service_name) AS service_name
-    FROM staging.service_use AS u
-    JOIN staging.service_known AS s ON u.service_event_id = s.event_id
+    FROM (SELECT DISTINCT client_event_id, service_event_id FROM staging.exchange) AS u
+    JOIN raw.ros2_rcl_service_init AS s ON u.service_event_id = s.event_id
     GROUP BY u.client_event_id
 ),
 every_client AS (
-    SELECT event_id, process_id, service_name, client_handle, rmw_handle, created_ns
     FROM staging.client_known
-    UNION ALL
-    SELECT e.event_id, e.process_id, l.service_name, NULL, e.rmw_handle, NULL
+    UNION ALL BY NAME
+    SELECT e.event_id, e.process_id, l.service_name, e.rmw_handle
     FROM staging.client_event AS e
     LEFT JOIN learned AS l ON e.event_id = l.client_event_id
     WHERE e.is_inferred AND e.event_id = e.client_event_id

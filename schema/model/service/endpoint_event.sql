@@ -5,12 +5,7 @@
 -- grain: one row per event
 CREATE OR REPLACE MACRO staging.endpoint_event(events, objects) AS TABLE
 WITH located AS NOT MATERIALIZED (
-    SELECT e.*, c.thread_id, c.process_id
-    FROM query_table(events) AS e
-    JOIN staging.context AS c
-        ON e.thread_index = c.thread_index
-        AND e.event_id >= c.from_event_id
-        AND e.event_id < c.until_event_id
+    FROM staging.located(events)
 ),
 resolved AS NOT MATERIALIZED (FROM staging.with_latest('located', objects)),
 first_use AS (

@@ -1,55 +1,61 @@
 -- description: Responses with what was traced of each, numbered in the order of sending, and the
---     request that each answers. A side that was not traced is NULL.
+--     request that each answers: at the service that of the same client and number that it took
+--     before, at the client the one that it sent. A number that was taken, or sent, twice tells
+--     nothing. A side that was not traced is NULL.
 -- grain: one row per response
 -- when: staging.client_event, staging.service_event
-WITH found AS (
-    SELECT send_event_id, take_event_id FROM staging.response_pair
-    UNION ALL
-    SELECT e.event_id, NULL
-    FROM staging.service_event AS e
-    ANTI JOIN staging.response_pair AS p ON e.event_id = p.send_event_id
-    WHERE NOT e.is_request
-    UNION ALL
-    SELECT NULL, e.event_id
-    FROM staging.client_event AS e
-    ANTI JOIN staging.response_pair AS p ON e.event_id = p.take_event_id
-    WHERE NOT e.is_request
+WITH taken_request AS (
+    SELECT service_event_id, gid, sequence_number, any_value(event_id) AS event_id
+    FROM staging.service_event
+    WHERE is_request
+    GROUP BY service_event_id, gid, sequence_number
+    HAVING count(*) = 1
+),
+sent_request AS (
+    SELECT client_event_id, sequence_number, any_value(event_id) AS event_id
+    FROM staging.client_event
+    WHERE is_request
+    GROUP BY client_event_id, sequence_number
+    HAVING count(*) = 1
 ),
 -- Of the ends of the request that of the service says more: several may have taken it.
 by_client AS (
     SELECT send_event_id, min(request_id) AS request_id
-    FROM staging.request_origin
-    WHERE send_event_id IS NOT NULL
+    FROM staging.request
     GROUP BY send_event_id
     HAVING count(*) = 1
-),
-single_gid AS (
-    SELECT gid, min(client_event_id) AS client_event_id
-    FROM staging.client_gid
-    GROUP BY gid
-    HAVING count(*) = 1
-),
-answered AS (
-    SELECT f.send_event_id, f.take_event_id, coalesce(s.request_id, c.request_id) AS request_id
-    FROM found AS f
-    LEFT JOIN staging.response_request AS sr ON f.send_event_id = sr.event_id
-    LEFT JOIN staging.request_origin AS s ON sr.request_event_id = s.take_event_id
-    LEFT JOIN staging.response_request AS cr ON f.take_event_id = cr.event_id
-    LEFT JOIN by_client AS c ON cr.request_event_id = c.send_event_id
 )
 SELECT
-    row_number() OVER (ORDER BY coalesce(a.send_event_id, a.take_event_id)) AS response_id,
-    client.client_id, service.service_id, a.request_id,
+    row_number() OVER (ORDER BY coalesce(s.event_id, c.event_id)) AS response_id,
+    coalesce(client.client_id, q.client_id) AS client_id,
+    coalesce(service.service_id, q.service_id) AS service_id,
+    q.request_id,
     coalesce(s.sequence_number, c.sequence_number) AS sequence_number,
-    s.ts_ns AS sent_ns, c.ts_ns AS taken_ns, s.thread_id AS sender_thread_id,
-    c.thread_id AS receiver_thread_id, i.callback_instance_id, a.send_event_id, a.take_event_id
-FROM answered AS a
-LEFT JOIN staging.service_event AS s ON a.send_event_id = s.event_id
-LEFT JOIN staging.client_event AS c ON a.take_event_id = c.event_id
-LEFT JOIN single_gid AS g ON s.gid = g.gid
-LEFT JOIN staging.request_origin AS q ON a.request_id = q.request_id
+    s.ts_ns AS sent_ns,
+    c.ts_ns AS taken_ns,
+    s.thread_id AS sender_thread_id,
+    c.thread_id AS receiver_thread_id,
+    q.callback_instance_id,
+    s.event_id AS send_event_id,
+    c.event_id AS take_event_id
+FROM (SELECT * FROM staging.exchange WHERE NOT is_request) AS x
+FULL JOIN (SELECT * FROM staging.service_event WHERE NOT is_request) AS s
+    ON x.event_at_service = s.event_id
+FULL JOIN (SELECT * FROM staging.client_event WHERE NOT is_request) AS c
+    ON x.event_at_client = c.event_id
+LEFT JOIN taken_request AS t
+    ON s.service_event_id = t.service_event_id
+    AND s.gid = t.gid
+    AND s.sequence_number = t.sequence_number
+    AND s.event_id >= t.event_id
+LEFT JOIN sent_request AS n
+    ON c.client_event_id = n.client_event_id
+    AND c.sequence_number = n.sequence_number
+    AND c.event_id >= n.event_id
+LEFT JOIN staging.request AS answered ON t.event_id = answered.take_event_id
+LEFT JOIN by_client AS b ON n.event_id = b.send_event_id
+LEFT JOIN staging.request AS q ON q.request_id = coalesce(answered.request_id, b.request_id)
+LEFT JOIN staging.client_gid AS g ON s.gid = g.gid AND g.is_single
 LEFT JOIN staging.client AS client
-    ON client.event_id = coalesce(c.client_event_id, g.client_event_id, q.client_event_id)
-LEFT JOIN staging.service AS service
-    ON service.event_id = coalesce(s.service_event_id, q.service_event_id)
-LEFT JOIN staging.callback_number AS i ON q.callback_start_event_id = i.start_event_id
+    ON client.event_id = coalesce(c.client_event_id, g.client_event_id)
+LEFT JOIN staging.service AS service ON s.service_event_id = service.event_id

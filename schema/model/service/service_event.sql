@@ -18,7 +18,10 @@ WITH event AS NOT MATERIALIZED (
 requester AS (
     SELECT client_gid, staging.gid_bytes(client_gid) AS gid FROM event GROUP BY client_gid
 ),
-service AS (SELECT event_id, process_id, rmw_handle AS handle FROM staging.service_known)
+service AS (
+    SELECT event_id, process_id, rmw_service_handle AS handle
+    FROM staging.located('raw.ros2_rcl_service_init')
+)
 SELECT
     e.event_id, e.ts_ns, e.thread_id, e.process_id, e.is_request, e.handle AS rmw_handle, g.gid,
     e.sequence_number, e.source_timestamp_ns, e.object_event_id AS service_event_id, e.is_inferred

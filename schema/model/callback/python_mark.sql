@@ -9,5 +9,5 @@ SELECT
     split_part(symbol, ' ', 2) AS kind,
     substr(symbol, 11 + length(split_part(symbol, ' ', 2))) AS text,
     previous_callback_event_id, previous_executor_event_id
-FROM staging.located('ros2_rclcpp_callback_register')
+FROM staging.located('raw.ros2_rclcpp_callback_register')
 WHERE symbol LIKE '#msgflow %' AND symbol NOT LIKE '#msgflow function %'

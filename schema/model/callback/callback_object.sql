@@ -3,16 +3,11 @@
 -- grain: one row per callback object
 -- when: staging.callback_known, staging.callback_binding
 WITH every_callback AS (
-    SELECT
-        event_id, event_id AS callback_event_id, process_id, kind, subscription_event_id,
-        timer_event_id, service_event_id, callback_handle, symbol, created_ns
     FROM staging.callback_known
-    UNION ALL
-    SELECT
-        min(start_event_id), NULL, process_id, 'unknown', NULL, NULL, NULL, callback_handle, NULL,
-        NULL
+    UNION ALL BY NAME
+    SELECT DISTINCT callback_event_id AS event_id, process_id, kind, callback_handle
     FROM staging.callback_binding
-    WHERE callback_event_id IS NULL
-    GROUP BY process_id, callback_handle
+    WHERE kind = 'unknown'
+        AND callback_event_id NOT IN (SELECT event_id FROM staging.callback_known)
 )
 SELECT row_number() OVER (ORDER BY event_id) AS callback_id, * FROM every_callback

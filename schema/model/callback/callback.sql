@@ -5,26 +5,25 @@
 -- when: staging.callback_object
 WITH learned AS (
     SELECT
-        b.process_id, b.callback_handle, b.callback_event_id,
+        b.callback_event_id,
         mode(t.subscription_id ORDER BY t.subscription_id) AS subscription_id
     FROM staging.callback_binding AS b
     JOIN staging.take_subscription AS t ON b.start_event_id = t.callback_start_event_id
-    WHERE coalesce(b.kind IN ('unknown', 'function', 'subscription'), true)
-    GROUP BY b.process_id, b.callback_handle, b.callback_event_id
+    WHERE b.kind IN ('unknown', 'function', 'subscription')
+    GROUP BY b.callback_event_id
 ),
 asked AS (
     SELECT
-        b.process_id, b.callback_handle, b.callback_event_id,
+        b.callback_event_id,
         mode(s.service_id ORDER BY s.service_id) AS service_id
     FROM staging.callback_binding AS b
     JOIN staging.service_event AS e ON b.request_event_id = e.event_id
     JOIN staging.service AS s ON e.service_event_id = s.event_id
-    GROUP BY b.process_id, b.callback_handle, b.callback_event_id
+    GROUP BY b.callback_event_id
 ),
 owned AS (
     SELECT
-        c.callback_id, c.event_id, c.callback_event_id, c.process_id, c.callback_handle, c.symbol,
-        c.created_ns,
+        c.callback_id, c.event_id, c.process_id, c.callback_handle, c.symbol, c.created_ns,
         CASE WHEN c.kind = 'unknown' THEN coalesce(o.kind, c.kind) ELSE c.kind END AS kind,
         CASE WHEN o.kind = 'subscription' THEN o.owner_event_id ELSE c.subscription_event_id END
             AS subscription_event_id,
@@ -33,10 +32,7 @@ owned AS (
         CASE WHEN o.kind = 'service' THEN o.owner_event_id ELSE c.service_event_id END
             AS service_event_id
     FROM staging.callback_object AS c
-    LEFT JOIN staging.callback_owner AS o
-        ON c.process_id = o.process_id
-        AND c.callback_handle = o.callback_handle
-        AND c.callback_event_id IS NOT DISTINCT FROM o.callback_event_id
+    LEFT JOIN staging.callback_owner AS o ON c.event_id = o.callback_event_id
 ),
 complete AS (
     SELECT
@@ -58,15 +54,11 @@ complete AS (
     LEFT JOIN learned AS l
         ON s.subscription_id IS NULL
         AND c.kind IN ('unknown', 'function', 'subscription')
-        AND c.process_id = l.process_id
-        AND c.callback_handle = l.callback_handle
-        AND c.callback_event_id IS NOT DISTINCT FROM l.callback_event_id
+        AND c.event_id = l.callback_event_id
     LEFT JOIN asked AS v
         ON e.service_id IS NULL
         AND c.kind IN ('unknown', 'function', 'service')
-        AND c.process_id = v.process_id
-        AND c.callback_handle = v.callback_handle
-        AND c.callback_event_id IS NOT DISTINCT FROM v.callback_event_id
+        AND c.event_id = v.callback_event_id
 )
 SELECT
     c.callback_id, c.process_id,

@@ -1,0 +1,121 @@
+-- description: Callback instances with their callback object, by the event that made it, else by
+--     its first instance, and the take or the request that
+--     they were called with. The callback_start directly follows the take's last layer, or the
+--     rmw_take_request, on its thread, with no event of the executor between the two. Neither an
+--     rmw take nor a request is for an intra-process call, nor is a dequeue for another one. The
+--     subscriptions, or services, agree where both are known. What goes on for something earlier
+--     has that, too: a call or a response.
+-- grain: one row per callback_start
+-- when: staging.callback_run
+
+-- Instances of Python that go on for something earlier: later steps of a coroutine, tasks, what is
+-- done with a response. Each with what it follows from: the instance on whose thread, and inside of
+-- which, the tracer said so (`step`); else what the thread took in that turn of its executor,
+-- before any callback, a response or a request. Of several that go on for one request, the first is
+-- its callback.
+-- when: staging.python_mark WHERE kind = 'resume'
+-- columns: start_event_id BIGINT, call_event_id BIGINT, response_event_id BIGINT, request_event_id
+--     BIGINT
+CREATE OR REPLACE TEMP TABLE callback_step AS
+WITH begun AS (
+    SELECT thread_id, process_id, start_event_id, end_event_id FROM staging.callback_run
+),
+resumed AS (
+    SELECT m.number, m.process_id, b.start_event_id
+    FROM staging.python_mark AS m
+    ASOF JOIN begun AS b ON m.thread_id = b.thread_id AND m.event_id < b.start_event_id
+    WHERE m.kind = 'resume'
+    QUALIFY row_number() OVER (PARTITION BY b.start_event_id ORDER BY m.event_id DESC) = 1
+),
+origin AS (
+    SELECT
+        r.start_event_id, m.event_id, m.thread_id,
+        greatest(m.previous_callback_event_id, m.previous_executor_event_id) AS turn_event_id
+    FROM resumed AS r
+    ASOF JOIN (FROM staging.python_mark WHERE kind = 'step') AS m
+        ON r.process_id = m.process_id AND r.number = m.number AND r.start_event_id > m.event_id
+),
+inside AS (
+    SELECT o.start_event_id, b.start_event_id AS call_event_id
+    FROM origin AS o
+    ASOF JOIN begun AS b ON o.thread_id = b.thread_id AND o.event_id > b.start_event_id
+    WHERE coalesce(b.end_event_id > o.event_id, true)
+),
+taken AS (
+    SELECT event_id, thread_id, is_request FROM staging.service_event WHERE is_request
+    UNION ALL
+    SELECT event_id, thread_id, is_request FROM staging.client_event WHERE NOT is_request
+),
+behind AS (
+    SELECT o.start_event_id, t.event_id, t.is_request
+    FROM origin AS o
+    ANTI JOIN inside AS i ON o.start_event_id = i.start_event_id
+    ASOF JOIN taken AS t ON o.thread_id = t.thread_id AND o.event_id > t.event_id
+    WHERE coalesce(t.event_id > o.turn_event_id, true)
+)
+SELECT
+    start_event_id, call_event_id, NULL::BIGINT AS response_event_id,
+    NULL::BIGINT AS request_event_id
+FROM inside
+UNION ALL
+SELECT start_event_id, NULL, event_id, NULL FROM behind WHERE NOT is_request
+UNION ALL
+SELECT
+    start_event_id,
+    CASE WHEN start_event_id > min(start_event_id) OVER same THEN min(start_event_id) OVER same END,
+    NULL,
+    CASE WHEN start_event_id = min(start_event_id) OVER same THEN event_id END
+FROM behind
+WHERE is_request
+WINDOW same AS (PARTITION BY event_id);
+
+WITH begun AS NOT MATERIALIZED (
+    SELECT
+        start_event_id AS event_id, process_id, callback_handle AS handle, is_intra_process,
+        previous_event_id, previous_executor_event_id
+    FROM staging.callback_run
+),
+known AS (SELECT event_id, process_id, callback_handle AS handle FROM staging.callback_known),
+resolved AS NOT MATERIALIZED (FROM staging.with_latest('begun', 'known')),
+first_run AS (
+    SELECT process_id, handle, min(event_id) AS event_id
+    FROM resolved
+    WHERE object_event_id IS NULL
+    GROUP BY process_id, handle
+),
+run AS (
+    SELECT
+        b.event_id AS start_event_id, b.process_id, b.handle AS callback_handle,
+        b.is_intra_process,
+        coalesce(b.object_event_id, f.event_id) AS callback_event_id,
+        coalesce(k.kind, 'unknown') AS kind,
+        k.subscription_event_id, k.service_event_id,
+        -- As recorded: what the executor said after the take stands, whatever else was lost. It is
+        -- NULL only where the thread had no executor event at all.
+        CASE
+            WHEN coalesce(b.previous_executor_event_id < b.previous_event_id, true)
+                THEN b.previous_event_id
+        END AS called_by_event_id
+    FROM resolved AS b
+    LEFT JOIN staging.callback_known AS k ON b.object_event_id = k.event_id
+    LEFT JOIN first_run AS f
+        ON b.object_event_id IS NULL AND b.process_id = f.process_id AND b.handle = f.handle
+)
+SELECT
+    r.start_event_id, r.process_id, r.callback_handle, r.is_intra_process, r.callback_event_id,
+    r.kind, t.start_event_id AS take_event_id,
+    coalesce(r.subscription_event_id, t.subscription_event_id) AS subscription_event_id,
+    coalesce(q.event_id, p.request_event_id) AS request_event_id,
+    p.call_event_id, p.response_event_id
+FROM run AS r
+LEFT JOIN staging.take_chain AS t
+    ON r.called_by_event_id = t.end_event_id
+    AND r.kind IN ('subscription', 'unknown', 'function')
+    AND r.is_intra_process = (t.method = 'ring_buffer')
+    AND coalesce(r.subscription_event_id = t.subscription_event_id, true)
+LEFT JOIN (SELECT * FROM staging.service_event WHERE is_request) AS q
+    ON r.called_by_event_id = q.event_id
+    AND r.kind IN ('service', 'unknown', 'function')
+    AND NOT r.is_intra_process
+    AND coalesce(r.service_event_id = q.service_event_id, true)
+LEFT JOIN callback_step AS p ON r.start_event_id = p.start_event_id
