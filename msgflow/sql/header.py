@@ -9,16 +9,13 @@
     -- param: depth BIGINT {1..} = 32     How deep; at least 1
     -- param: bins BIGINT {1..2000} = 80     How many; at most 2000
     -- column: median_ns BIGINT [ns]  Half of the flows took no longer
-    -- brief: path, median_ns
-    -- answer: lost
-    -- heading: rank, latency_ns
+    -- brief: rank (heading), path, median_ns (slowest), lost (even 0)
     -- note: clocks
     -- when: staging.gap
     -- also: derive.a_b
     -- reads: path_chain, derive.a_c
     -- next: query topics --topic {topic_name} | check
     -- variant: measure VARCHAR {latency|age} = 'latency'  What is measured
-    -- like: main.end_to_end, main.flow_path
     -- column: run_id, path_id, root_ns
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
@@ -32,12 +29,11 @@ folder are in stands before. Only what others put in front of theirs says its ki
 - `note: requests`: likewise of requests to services. The rows compare times of hosts as well.
 - `note: goals`: likewise of goals of actions.
 - `note: samples`: likewise of samples of functions. The rows compare times of hosts as well.
-- `brief`: the columns that a narrow terminal shows, the most important first.
-- `answer`: columns that stay where they are 0 in all rows, since people ask for them.
-- `heading`: columns that stand above a table on a terminal, once for each value of the first one,
-  on which the others depend.
-- `slowest`: the column that `--slowest N` goes by.
-- `zero`: the column that is 0 in rows that a terminal leaves out.
+- `brief`: the columns that a narrow terminal shows, the most important first. A mark behind one
+  says how the rows are shown on a terminal: `(heading)`, above a table, once for each value of the
+  first of these, on which the others depend; `(even 0)`, also where it is 0 in all rows, since
+  people ask for it; `(not 0)`, rows in which it is 0 are left out. `--slowest N` goes by the column
+  with the mark `(slowest)`.
 - `when`: tables, views, or macros of a run. If none of them has a row, this object has none either,
   and an ingest does not run its SQL. A condition may follow a name, as in
   `store.gap WHERE kind = 'loss'`: then only such rows count. In the model only tables count, and
@@ -53,15 +49,17 @@ folder are in stands before. Only what others put in front of theirs says its ki
   value of that column in the row, as one word. Of several, with ` | ` between them, the first holds
   whose columns all have values.
 
-- `like`: other files of the folder, of `schema/public` (main.NAME) or `queries` (queries.NAME). A
-  `param` or a `column` may be a list of names: the first of these files that has it declares it.
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
   A query may have several: each value of them is one file.
 
+A `param` or `column` may be a list of names, whose meaning stands elsewhere: in the query of which
+this file is a variant (NAME-variant.sql, or NAME.sql of a lake), for a public view in the table of
+the same name, else in `schema/vocabulary.sql`. There stands what several files mean alike. A file
+in which a word means something else declares it itself.
+
 The unit of a column may also say what the column names: 'node', 'topic', 'callback', 'host' or
-'path'. Options that choose rows by them use it. In a public view over the table of the same name, a
-column may stand by its name alone: the table declares the rest. Files in `schema/health` have a
+'path'. Options that choose rows by them use it. Files in `schema/health` have a
 `severity`, a `cause` and a `cure`. An object is made after all objects that its statement, its
 `when`, its `also` or its `reads` names.
 
@@ -85,9 +83,9 @@ import re
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 from msgflow.files.resources import resource_directory
 from msgflow.sql.value import Value, parse_literal
@@ -134,9 +132,8 @@ SCHEMAS = {
     "internal": "internal",
 }
 # Fields of a header that have the text that stands there, or the names.
-_TEXTS = ("severity", "cause", "cure", "note", "slowest", "zero")
-_LISTS = ("brief", "answer", "heading", "also", "reads")
-_Item = TypeVar("_Item", "Param", "Column")
+_TEXTS = ("severity", "cause", "cure", "note")
+_LISTS = ("also", "reads")
 
 
 class HeaderError(ValueError):
@@ -199,8 +196,8 @@ class Header:
     cure: str | None = None  # remedy for a finding, else None
     note: str | None = None
     brief: tuple[str, ...] = ()
-    answer: tuple[str, ...] = ()
-    heading: tuple[str, ...] = ()
+    answer: tuple[str, ...] = ()  # columns that a terminal shows even where all are 0
+    heading: tuple[str, ...] = ()  # columns that stand above a table
     slowest: str | None = None  # column by which rows are the slowest, else None
     zero: str | None = None  # column that is 0 in rows that a terminal leaves out, else None
     steps: tuple[Step, ...] = ()  # what a query makes before, in order
@@ -282,14 +279,13 @@ def parse(text: str, path: Path) -> Header:
     fields, body = _split(text, path)
     steps, body = _steps(body)
     single = {field.key: field.value for field in fields if field.key not in _REPEATABLE}
-    # Of several files that declare a name the first counts.
-    like = [_like(name, path) for name in reversed(_names(single.get("like", "")))]
-    known_params = {param.name: param for header in like for param in header.params}
-    known_columns = {column.name: column for header in like for column in header.columns}
-    of_table = path.parent.name == "public"
-    params = _declared("param", fields, partial(_params, known_params), path)
-    variants = _declared("variant", fields, partial(_params, {}), path)
-    columns = _declared("column", fields, partial(_columns, known_columns, of_table), path)
+    brief = [name.partition(" ")[::2] for name in _names(single.get("brief", ""))]
+
+    def marked(mark: str) -> tuple[str, ...]:
+        return tuple(name for name, its_mark in brief if its_mark == mark)
+
+    params: tuple[Param, ...] = _declared("param", fields, _param, path)
+    columns: tuple[Column, ...] = _declared("column", fields, _column, path)
     if "reads" in single:
         steps = (*_read_steps(_names(single["reads"]), path), *steps)
     name = name_of(path)
@@ -305,7 +301,12 @@ def parse(text: str, path: Path) -> Header:
         path=path,
         steps=steps,
         sources=_sources(single.get("when", "")),
-        variants=variants,
+        brief=tuple(name for name, _ in brief),
+        answer=marked("(even 0)"),
+        heading=marked("(heading)"),
+        slowest=next(iter(marked("(slowest)")), None),
+        zero=next(iter(marked("(not 0)")), None),
+        variants=_declared("variant", fields, _param, path),
         next=tuple(tuple(shlex.split(one)) for one in single.get("next", "").split(" | ") if one),
         **{key: single.get(key) for key in _TEXTS},  # type: ignore[arg-type]
         **{key: _names(single.get(key, "")) for key in _LISTS},  # type: ignore[arg-type]
@@ -403,34 +404,56 @@ def _makers(folder: Path) -> Mapping[str, Path]:
     }
 
 
-def _like(name: str, path: Path) -> Header:
-    room, _, stem = name.rpartition(".")
-    room = "schema/public" if room == "main" else room
-    folder = resource_directory(room) if room else path.parent
-    return _declaring(folder / f"{stem}.sql")
+def vocabulary() -> Header:
+    """Return the parameters and columns that several files mean alike."""
+    return _declaring(resource_directory("schema") / "vocabulary.sql")
+
+
+def _meaning(key: str, name: str, path: Path) -> Param | Column:
+    """Return what a name means that stands alone in a file."""
+    # A table may declare the columns of a public view, and is not known here.
+    if key == "column" and path.parent.name == "public":
+        return Column(name, "", None, "")
+    base = _base(path)
+    for header in (*([] if base is None else [_declaring(base)]), vocabulary()):
+        for item in header.params if key == "param" else header.columns:
+            if item.name == name:
+                return item
+    raise ValueError(f"nothing declares this {key} — {name}")
+
+
+def _base(path: Path) -> Path | None:
+    """Return the query of which a file is a variant, or which it asks of a lake."""
+    queries, name = resource_directory("queries"), path.stem
+    if path.parent.parent.name == "fleet":
+        names = [name.replace("_", "-")]
+    else:
+        parts = name.split("-") if path.parent == queries else []
+        names = ["-".join(parts[:end]) for end in range(1, len(parts))]
+    return next((file for each in names if (file := queries / f"{each}.sql").exists()), None)
 
 
 _declaring = cache(read)
 
 
 def _declared(
-    key: str, fields: Sequence[_Field], read_value: Callable[[str], Iterable[_Item]], path: Path
-) -> tuple[_Item, ...]:
+    key: str, fields: Sequence[_Field], read_value: Callable[[str], Any], path: Path
+) -> tuple[Any, ...]:
     """Return what all fields of a key declare."""
-    items: list[_Item] = []
+    items: list[Any] = []
     for field in fields:
         if field.key == key:
             try:
-                items += read_value(field.value)
+                if _NAMES.fullmatch(field.value):
+                    items += (_meaning(key, name, path) for name in _names(field.value))
+                else:
+                    items.append(read_value(field.value))
             except ValueError as error:
                 raise _error(path, field.line, str(error)) from None
     return tuple(items)
 
 
-def _params(known: Mapping[str, Param], text: str) -> list[Param]:
-    names = _names(text)
-    if known.keys() >= set(names):
-        return [known[name] for name in names]
+def _param(text: str) -> Param:
     match = _PARAM.fullmatch(text)
     if match is None or (match["default"] is not None and len(match["gap"]) < 2):
         raise ValueError(
@@ -445,31 +468,23 @@ def _params(known: Mapping[str, Param], text: str) -> list[Param]:
         minimum, choices = int(limits[1]), ()
         maximum = int(limits[2]) if limits[2] else None
     default = None if match["default"] is None else parse_literal(match["default"])
-    return [
-        Param(
-            name=match["name"],
-            type=match["type"],
-            default=default,
-            has_default=match["default"] is not None,
-            description=" ".join(match["description"].split()),
-            choices=choices,
-            minimum=minimum,
-            maximum=maximum,
-        )
-    ]
+    return Param(
+        name=match["name"],
+        type=match["type"],
+        default=default,
+        has_default=match["default"] is not None,
+        description=" ".join(match["description"].split()),
+        choices=choices,
+        minimum=minimum,
+        maximum=maximum,
+    )
 
 
-def _columns(known: Mapping[str, Column], of_table: bool, text: str) -> list[Column]:
-    if _NAMES.fullmatch(text):
-        unknown = [name for name in _names(text) if name not in known]
-        # Of a public view its table may declare them.
-        if unknown and not of_table:
-            raise ValueError(f"nothing declares this column — {unknown[0]}")
-        return [known.get(name, Column(name, "", None, "")) for name in _names(text)]
+def _column(text: str) -> Column:
     match = _COLUMN.fullmatch(text)
     if match is None:
         raise ValueError(f"expected '-- column: name TYPE [unit]  description', not {text!r}")
-    return [Column(match["name"], match["type"], match["unit"], match["description"])]
+    return Column(match["name"], match["type"], match["unit"], match["description"])
 
 
 def _error(path: Path, line: int, message: str) -> HeaderError:

@@ -19,9 +19,9 @@ from msgflow.cli.operation import OWN
 from msgflow.cli.query_command import build_command
 from msgflow.database import Database
 from msgflow.db import objects
-from msgflow.query.catalogue import load_query
+from msgflow.query.catalogue import load_query, query_names
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
-from msgflow.sql.header import SCHEMAS, Header, read
+from msgflow.sql.header import SCHEMAS, Column, Header, Param, read, vocabulary
 from msgflow.sql.statement import RECORDED, Statements, internal_sql
 from msgflow.view.page_query import DIRECTORY, page_query
 
@@ -282,6 +282,57 @@ def test_a_query_says_which_steps_of_others_it_reads() -> None:
         assert set(file.header.reads) == words & others, file
     tables = [step.table for file in QUERIES for step in file.header.steps]
     assert made.keys() == set(tables)
+
+
+def terms(header: Header) -> Iterator[tuple[str, str]]:
+    """Yield kind and name of what a header takes from the vocabulary."""
+    for kind, ours, theirs in (
+        ("param", header.params, vocabulary().params),
+        ("column", header.columns, vocabulary().columns),
+    ):
+        # One of the same words that stands in the file itself is another object.
+        yield from ((kind, each.name) for each in theirs if any(each is own for own in ours))
+
+
+def family(header: Header) -> str:
+    """Return the query of which a file is a variant, or which it asks of a lake; else its path."""
+    name = header.path.stem.replace("_", "-")
+    queries = (query for query in query_names() if f"{name}-".startswith(f"{query}-"))
+    return next(queries, str(header.path))
+
+
+def test_a_term_of_the_vocabulary_returns() -> None:
+    """What one statement alone means, with its variants, stands in its header."""
+    users: dict[tuple[str, str], set[str]] = {}
+    for header in (*(file.header for file in FILES), *OF_PACKAGE):
+        for term in terms(header):
+            users.setdefault(term, set()).add(family(header))
+    declared = {("param", each.name) for each in vocabulary().params}
+    declared |= {("column", each.name) for each in vocabulary().columns}
+    assert {term for term in declared if len(users.get(term, ())) < 2} == set()
+
+
+@each(
+    [
+        header
+        for header in (*(file.header for file in FILES), *OF_PACKAGE)
+        if family(header) in (header.name, str(header.path))
+    ],
+    name=lambda header: str(header.path),
+)
+def test_what_the_vocabulary_means_does_not_stand_in_a_file_again(header: Header) -> None:
+    taken = {name for _, name in terms(header)}
+    known = {each.name: each for each in (*vocabulary().params, *vocabulary().columns)}
+    for declared in (*header.params, *header.columns):
+        if declared.name not in taken and type(declared) in (Param, Column):
+            assert declared != known.get(declared.name), declared.name
+
+
+def test_the_vocabulary_is_in_order() -> None:
+    for items in (vocabulary().params, vocabulary().columns):
+        names = [each.name for each in items]
+        assert names == sorted(set(names))
+    assert {each.type for each in vocabulary().columns if each.name.endswith("_ns")} == {"BIGINT"}
 
 
 @each([*(file.header for file in FILES), *OF_PACKAGE], name=lambda header: str(header.path))

@@ -2,12 +2,11 @@
 --     time with the median of the piece.
 -- grain: one row per flow, or per piece of time with flows
 -- reads: flow
--- like: path_slowest
--- param: path BIGINT  Number of the path
+-- param: path
 -- param: limit BIGINT {1..50000} = 2000  Most rows
 -- param: begin_at, end_at
 -- column: root_at, root_kind, root_id
--- column: take_id BIGINT  Take at the end; NULL: not reached
+-- column: take_id BIGINT  Take at the end of the path; NULL: not reached
 -- column: latency BIGINT [ns]  Latency; of the slowest in the piece
 -- column: median BIGINT [ns]  Median of the piece; the latency itself where flows are one by one
 -- column: count BIGINT  Flows in the piece

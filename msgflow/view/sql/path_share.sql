@@ -2,10 +2,9 @@
 --     share of the flows took no longer.
 -- grain: one row per share
 -- reads: flow
--- param: path BIGINT  Number of the path
+-- param: path
 -- param: steps BIGINT {1..2000} = 200  Number of shares
--- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin
--- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
+-- param: begin_at, end_at
 -- column: share DOUBLE  Share of the flows, 0 to 1
 -- column: latency BIGINT [ns]  Latency that they did not exceed
 WITH ranked AS (

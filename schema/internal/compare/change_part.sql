@@ -15,7 +15,7 @@
 -- column: what VARCHAR  Callback, or topic of the message
 -- column: a_mean_ns BIGINT [ns]  How long it took in run A, per flow
 -- column: b_mean_ns BIGINT [ns]  The same in run B
--- column: path VARCHAR [path]  Nodes and topics
+-- column: path
 -- brief: path, difference_ns, share, node, part, what, a_mean_ns, b_mean_ns
 WITH state AS (
     UNPIVOT (

@@ -2,7 +2,6 @@
 --     show, a sentence each: what was lost, what is left out, what verdicts are said of.
 -- grain: one row per sentence
 -- reads: compared
--- like: comparison
 -- param: run_a, run_b, what
 WITH lost AS (
     SELECT run_id, coalesce(sum(discarded_event_count), 0)::BIGINT AS events
