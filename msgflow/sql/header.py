@@ -81,7 +81,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -114,7 +114,6 @@ _OBJECT = re.compile(r"(?:raw|staging|store|derive|main)\.[a-z_0-9]+\b")
 _RELATION = re.compile(r"\b(?:FROM|JOIN) ([a-z_0-9]+)\b(?![.(])")
 _NEXT_SOURCE = re.compile(r", (?=[a-z]+\.)")
 _RANGE = re.compile(r"(-?\d+)\.\.(-?\d+)?")
-_REPEATABLE = ("param", "column", "variant")
 _MACRO = re.compile(r"(?:--[^\n]*\n|\s)*CREATE (?:OR REPLACE )?MACRO ")
 # The schema of the database that the objects of a folder of `schema/` are in.
 SCHEMAS = {
@@ -264,13 +263,6 @@ class Header:
         return None
 
 
-@dataclass(frozen=True)
-class _Field:
-    key: str
-    value: str
-    line: int
-
-
 def parse(text: str, path: Path) -> Header:
     """Parse the text of an SQL file.
 
@@ -278,7 +270,7 @@ def parse(text: str, path: Path) -> Header:
     """
     fields, body = _split(text, path)
     steps, body = _steps(body)
-    single = {field.key: field.value for field in fields if field.key not in _REPEATABLE}
+    single = dict(fields)
     brief = [name.partition(" ")[::2] for name in _names(single.get("brief", ""))]
 
     def marked(mark: str) -> tuple[str, ...]:
@@ -331,29 +323,24 @@ def relations_of(text: str) -> frozenset[str]:
     return frozenset(_RELATION.findall(_code(text)))
 
 
-def _split(text: str, path: Path) -> tuple[list[_Field], str]:
+def _split(text: str, path: Path) -> tuple[list[tuple[str, str]], str]:
     body = _HEAD.sub("", text, count=1)
-    fields: list[_Field] = []
-    for number, line in enumerate(text[: len(text) - len(body)].splitlines(), start=1):
-        if continuation := _CONTINUATION.fullmatch(line.rstrip()):
-            if not fields:
-                raise _error(path, number, "the header starts with a continuation line")
-            last = fields.pop()
+    fields: list[tuple[str, str]] = []
+    for line in map(str.rstrip, text[: len(text) - len(body)].splitlines()):
+        if fields and (continuation := _CONTINUATION.fullmatch(line)):
+            key, value = fields.pop()
             # Two spaces, so that the description of a parameter may begin on the next line.
-            gap = "  " if last.key in ("param", "variant") else " "
-            joined = f"{last.value}{gap}{continuation['value']}".strip()
-            fields.append(_Field(last.key, joined, last.line))
-        elif match := _FIELD.fullmatch(line.rstrip()):
-            fields.append(_Field(match["key"], match["value"] or "", number))
+            gap = "  " if key in ("param", "variant") else " "
+            fields.append((key, f"{value}{gap}{continuation['value']}".strip()))
+        elif match := _FIELD.fullmatch(line):
+            fields.append((match["key"], match["value"] or ""))
         else:
-            raise _error(
-                path,
-                number,
-                f"expected '-- field: value', or a continuation after four spaces, not {line!r}"
-                " (separate other comments from the header by an empty line)",
+            raise HeaderError(
+                f"{path}: expected '-- field: value', or a continuation after four spaces, not"
+                f" {line!r} (separate other comments from the header by an empty line)"
             )
     if not fields:
-        raise _error(path, 1, "there is no header")
+        raise HeaderError(f"{path}: there is no header")
     return fields, body.strip("\n") + "\n"
 
 
@@ -415,7 +402,7 @@ def _meaning(key: str, name: str, path: Path) -> Param | Column:
     if key == "column" and path.parent.name == "public":
         return Column(name, "", None, "")
     base = _base(path)
-    for header in (*([] if base is None else [_declaring(base)]), vocabulary()):
+    for header in (vocabulary(),) if base is None else (_declaring(base), vocabulary()):
         for item in header.params if key == "param" else header.columns:
             if item.name == name:
                 return item
@@ -424,32 +411,31 @@ def _meaning(key: str, name: str, path: Path) -> Param | Column:
 
 def _base(path: Path) -> Path | None:
     """Return the query of which a file is a variant, or which it asks of a lake."""
-    queries, name = resource_directory("queries"), path.stem
-    if path.parent.parent.name == "fleet":
-        names = [name.replace("_", "-")]
-    else:
-        parts = name.split("-") if path.parent == queries else []
-        names = ["-".join(parts[:end]) for end in range(1, len(parts))]
-    return next((file for each in names if (file := queries / f"{each}.sql").exists()), None)
+    queries, name = resource_directory("queries"), path.stem.replace("_", "-")
+    if path.parent == queries:
+        name = name.rpartition("-")[0]
+    elif path.parent.parent.name != "fleet":
+        return None
+    base = queries / f"{name}.sql"
+    return base if base.exists() else None
 
 
 _declaring = cache(read)
 
 
 def _declared(
-    key: str, fields: Sequence[_Field], read_value: Callable[[str], Any], path: Path
+    key: str, fields: Iterable[tuple[str, str]], read_value: Callable[[str], Any], path: Path
 ) -> tuple[Any, ...]:
     """Return what all fields of a key declare."""
     items: list[Any] = []
-    for field in fields:
-        if field.key == key:
-            try:
-                if _NAMES.fullmatch(field.value):
-                    items += (_meaning(key, name, path) for name in _names(field.value))
-                else:
-                    items.append(read_value(field.value))
-            except ValueError as error:
-                raise _error(path, field.line, str(error)) from None
+    for value in (value for each, value in fields if each == key):
+        try:
+            if _NAMES.fullmatch(value):
+                items += (_meaning(key, name, path) for name in _names(value))
+            else:
+                items.append(read_value(value))
+        except ValueError as error:
+            raise HeaderError(f"{path}: {error}") from None
     return tuple(items)
 
 
@@ -485,7 +471,3 @@ def _column(text: str) -> Column:
     if match is None:
         raise ValueError(f"expected '-- column: name TYPE [unit]  description', not {text!r}")
     return Column(match["name"], match["type"], match["unit"], match["description"])
-
-
-def _error(path: Path, line: int, message: str) -> HeaderError:
-    return HeaderError(f"{path}:{line}: {message}")

@@ -133,11 +133,11 @@ def test_a_macro_keeps_its_whole_statement() -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("--param: a BIGINT  x", "example.sql:3: expected '-- field: value'"),
-        ("-- param: a BIGINT", "example.sql:3: expected '-- param: name TYPE"),
+        ("--param: a BIGINT  x", "example.sql: expected '-- field: value'"),
+        ("-- param: a BIGINT", "example.sql: expected '-- param: name TYPE"),
         ("-- param: a BIGINT = 1 one space", "expected '-- param: name TYPE"),
         ("-- param: a BIGINT = one  Default", "'one' is not NULL, TRUE, FALSE, a number"),
-        ("-- column: a-b", "example.sql:3: expected '-- column: name TYPE [unit]"),
+        ("-- column: a-b", "example.sql: expected '-- column: name TYPE [unit]"),
     ],
 )
 def test_a_bad_line_is_named(line: str, message: str) -> None:
@@ -201,7 +201,7 @@ def test_the_next_command_is_the_first_whose_columns_have_values() -> None:
     [
         ("SELECT 1\n", "there is no header"),
         ("", "there is no header"),
-        ("--     first\nSELECT 1\n", "starts with a continuation"),
+        ("--     first\nSELECT 1\n", "expected '-- field: value'"),
     ],
 )
 def test_an_incomplete_file_is_refused(text: str, message: str) -> None:
