@@ -5,8 +5,7 @@
 --     Every part is measured if both its ends were traced and are known to be of one goal (view
 --     goal). Before Kilted, ROS has no events of requests: then there are no rows.
 -- grain: one row per action server and client
--- column: run_id BIGINT              Run
--- column: action_name VARCHAR        Action
+-- column: run_id, action_name
 -- column: server VARCHAR [node]  Node of the action server; empty: not known
 -- column: client VARCHAR [node]  Node of the action client; empty: not known
 -- column: goals BIGINT               Goals sent or taken in the time window

@@ -3,29 +3,27 @@
 --     which message it was called with, and what it published meanwhile. Instances that never ended
 --     come last.
 -- grain: one row per callback instance
--- column: run_id BIGINT             Run
+-- column: run_id
 -- column: start_ns BIGINT [epoch ns]  Start of the callback
 -- column: duration_ns BIGINT [ns]   From its start to its end; empty: never seen to end
 -- column: running_ns BIGINT [ns]    Of that, on a CPU; empty: not traced by the kernel
 -- column: preempted_ns BIGINT [ns]  Of that, another thread had the CPU
--- column: node VARCHAR [node]       Node of the callback
--- column: callback VARCHAR [callback]  What triggers it
+-- column: node, callback
 -- column: published VARCHAR         Topics of the messages it published itself, and how many of
 --     each if several
 -- column: publications BIGINT       How many messages it published itself
 -- column: process VARCHAR           Process, by its name and id
 -- column: tid INTEGER               Thread
--- column: host VARCHAR [host]       Host
+-- column: host
 -- column: depth INTEGER             1; more: nested in that many callback instances less one
 -- column: take_id BIGINT            Message it was called with: msgflow flow --take shows its flow
 -- column: is_loss_affected BOOLEAN  A gap of the trace may hide its end or what it did
 -- column: callback_instance_id BIGINT  Identity of the callback instance:
 --     msgflow flow --callback-instance
 -- column: callback_id BIGINT        Identity of the callback
--- column: is_internal BOOLEAN       Infrastructure of ROS
--- slowest: duration_ns
--- brief: duration_ns, node, callback, start_ns, take_id, published, running_ns, preempted_ns, tid,
---     callback_instance_id, process, host
+-- column: is_internal
+-- brief: duration_ns (slowest), node, callback, start_ns, take_id, published, running_ns,
+--     preempted_ns, tid, callback_instance_id, process, host
 -- note: callbacks
 WITH instance AS (
     SELECT

@@ -5,25 +5,22 @@
 -- grain: one row per callback object that ran; one for all timers that a node made of one function
 --     and period
 -- variant: each BOOLEAN = false  Each callback instance, the longest first
--- like: scheduling, path-breakdown
 -- column: run_id, node, callback
 -- column: objects BIGINT            Callback objects that it stands for, timers made anew
--- column: count BIGINT              Callback instances that began in the time window
+-- column: count
 -- column: open BIGINT               Instances without an end
 -- column: rate_hz DOUBLE [Hz]      Instances per second, from the first start to the last; NULL:
 --     these are less than half of the recording or time window apart, such as in a burst
 -- column: period_min_ns BIGINT [ns]     Shortest time from one start to the next
--- column: period_median_ns BIGINT [ns]  Median time from one start to the next
+-- column: period_median_ns
 -- column: period_max_ns BIGINT [ns]     Longest time from one start to the next
 -- column: min_ns BIGINT [ns]        Shortest duration
--- column: median_ns, mean_ns, p95_ns
--- column: p99_ns BIGINT [ns]        99 % of the durations are at most this
--- column: max_ns, total_ns
+-- column: median_ns, mean_ns, p95_ns, p99_ns, max_ns, total_ns
 -- column: running_median_ns BIGINT [ns]  Median CPU time; empty: not traced by the kernel
 -- column: running_p99_ns
 -- column: preempted_p99_ns BIGINT [ns]  99 % lost the CPU to other threads for at most this long
 -- column: preempted_ns BIGINT [ns]      Sum of the time for which others had the CPU
--- column: symbol VARCHAR            Function registered for the callback
+-- column: symbol
 -- column: callback_id BIGINT        Identity of the callback, of the first of several
 -- column: is_internal
 -- brief: node, callback, count, median_ns, p99_ns, max_ns, running_p99_ns, preempted_p99_ns,

@@ -3,15 +3,14 @@
 --     the shortest delay of each after the current correction. A correction needs both directions;
 --     the shorter both delays, the more exact it is.
 -- grain: one row per pair of clocks and direction with messages or packets
--- column: run_id BIGINT                       Run
+-- column: run_id
 -- column: from_hosts VARCHAR [host]  Hosts of the clock that sent
 -- column: to_hosts VARCHAR [host]  Hosts of the clock that received
 -- column: message_count BIGINT                Messages of ROS matched by their stamps alone,
 --     requests and responses
 -- column: packet_count BIGINT                 Network packets that kernel traces recorded at both
 --     ends
--- column: shortest_message_ns BIGINT [ns]     Shortest delay of a message, after correction
--- column: shortest_packet_ns BIGINT [ns]      Shortest delay of a packet, after correction
+-- column: shortest_message_ns, shortest_packet_ns
 -- brief: from_hosts, to_hosts, message_count, shortest_message_ns, packet_count, shortest_packet_ns
 WITH named AS (
     SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts

@@ -5,7 +5,7 @@
 -- grain: one row per clock
 -- variant: by VARCHAR {clock|pair} = 'clock'  What a row is: a clock, or two of them with the
 --     messages and packets between them
--- column: run_id BIGINT                       Run
+-- column: run_id
 -- column: hosts VARCHAR [host]  Hosts that have it
 -- column: method VARCHAR                      'messages', 'packets' (those of kernel traces as
 --     well) or 'file'; 'reference': others are corrected to it; 'none': as recorded

@@ -5,10 +5,8 @@
 --     Unless detail is full, those below 1 % are summed up as 'rest'. Flows with a stored message
 --     have no latency, and are left out.
 -- grain: one row per flow and piece, node or activity
--- like: e2e-latency, functions
--- steps: path_chain, path_outcome, named_path
--- param: from VARCHAR = NULL  Topics or nodes where flows start
--- param: to, via, without
+-- reads: path_chain, path_outcome, named_path
+-- param: from, to, via, without
 -- param: slowest BIGINT {1..} = 1  Number of flows
 -- param: quantile VARCHAR {median|p90|p95|p99|max} = NULL  Instead, the flow at this quantile of
 --     the latency
@@ -22,7 +20,7 @@
 -- column: rank BIGINT              Number of the flow, the slowest first
 -- column: at_ns BIGINT [ns]        Start, since the start of the flow; empty for several pieces
 -- column: duration_ns BIGINT [ns]  Duration; negative if parts of the flow overlap
--- column: hop BIGINT               Number of the message on the path that it belongs or leads to
+-- column: hop
 -- column: part VARCHAR             Part of the flow: 'callback', 'cache', 'request_to_take',
 --     'service', 'response_to_take', 'publish' or its layer, 'publish_to_take' or
 --     'take_to_callback'
@@ -39,7 +37,7 @@
 --     in brackets
 -- column: node VARCHAR [node]      Node that did it, or that waited; 'between nodes' where neither
 --     worked: network_or_idle, unless its thread is known to have run or waited for a CPU
--- column: what VARCHAR             The callback, or the topic of the message
+-- column: what
 -- column: share DOUBLE [share]     Part of the latency, rounded to 4 places
 -- column: pieces BIGINT            Number of pieces in the row
 -- column: is_certain BOOLEAN       For 'executor_busy', 'all_threads_busy' and 'blocked': what
@@ -48,9 +46,9 @@
 -- column: wakers BIGINT            How many wakers lead to that thread: 0 for the one that waited
 -- column: priority INTEGER         Its priority to the kernel; below 100 real-time
 -- column: who_priority INTEGER     Priority of what took the CPU
--- column: from_ns BIGINT [epoch ns]  Begin
--- column: callback_instance_id BIGINT  Callback instance
--- column: publication_id BIGINT    Message
+-- column: from_ns
+-- column: callback_instance_id BIGINT  Identity of the callback instance
+-- column: publication_id
 -- column: take_id BIGINT           Take at the end of the flow
 -- column: latency_ns BIGINT [ns]   Latency of the whole flow
 -- column: is_ambiguous BOOLEAN     The flow passes a link that may be another one (a
@@ -58,9 +56,9 @@
 -- column: is_cut BOOLEAN           Paths of the run were left out beyond max_depth or max_paths:
 --     one may have a slower flow
 -- column: path VARCHAR [path]      Nodes and topics of the flow
--- heading: rank, latency_ns, take_id, is_ambiguous, path
--- brief: rank, at_ns, duration_ns, share, activity, state, who, node, what, is_certain, pieces,
---     hop, part, thread, wakers, priority, who_priority
+-- brief: rank (heading), at_ns, duration_ns, share, activity, state, who, node, what, is_certain,
+--     pieces, hop, part, thread, wakers, priority, who_priority, latency_ns (heading),
+--     take_id (heading), is_ambiguous (heading), path (heading)
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE critical_flow AS
 WITH path AS (

@@ -4,13 +4,8 @@
 --     until the next output. Their age right before that is the highest that they reach: the peak
 --     age. The time window applies to outputs.
 -- grain: one row per path
--- like: e2e-latency
--- steps: path_chain
--- param: from, to
--- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that is the input
--- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that is the
---     output
--- param: max_depth, max_paths
+-- reads: path_chain
+-- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: outputs BIGINT           Outputs in the time window
 -- column: loss_affected BIGINT     Outputs with a gap of a trace in the time since their input
@@ -19,16 +14,13 @@
 -- column: min_ns BIGINT [ns]       Lowest age of an output
 -- column: median_ns BIGINT [ns]    Median age of outputs
 -- column: mean_ns BIGINT [ns]      Mean age of outputs
--- column: p95_ns BIGINT [ns]       95 % of the ages are at most this
--- column: p99_ns BIGINT [ns]       99 % of the ages are at most this
+-- column: p95_ns, p99_ns
 -- column: max_ns BIGINT [ns]       Highest age of an output
 -- column: peak_median_ns BIGINT [ns]  Median peak age
 -- column: peak_p95_ns BIGINT [ns]     95 % of the peak ages are at most this
 -- column: peak_max_ns BIGINT [ns]     Maximum data age: the highest peak age
 -- column: time_mean_ns BIGINT [ns]    Mean age over time, from the first output to the last
--- column: sink_event VARCHAR       Event that is the output: to_event, or 'take' where the sink
---     never shows a callback
--- column: is_cut, path
+-- column: sink_event, is_cut, path
 -- brief: path, outputs, median_ns, p99_ns, max_ns, peak_max_ns, ambiguous, loss_affected, p95_ns,
 --     peak_median_ns, peak_p95_ns, mean_ns
 -- note: clocks

@@ -5,10 +5,10 @@
 --     effect. The newest root that an arrival reflects says how old the data were. Give --from and
 --     --to: else there is a row for each two topics between which a path leads.
 -- grain: one row per topic where flows start, topic where they end, and node that takes it
--- like: e2e-latency, main.end_to_end_between
--- steps: path_chain, path_outcome, named_path
+-- reads: path_outcome, named_path
 -- param: from, to, from_event, to_event, max_depth, max_paths
--- column: run_id, first_topic, last_topic, node
+-- column: run_id, first_topic, last_topic
+-- column: node VARCHAR [node]  Node that takes it
 -- column: paths BIGINT             Paths between them
 -- column: roots
 -- column: reached BIGINT           Roots that arrived, by any path
@@ -48,11 +48,10 @@
 -- column: newest_p99_ns BIGINT [ns]    99 % are at most this
 -- column: newest_max_ns BIGINT [ns]    The highest
 -- column: is_cut BOOLEAN           There may be more paths, beyond max_depth or max_paths
--- brief: first_topic, last_topic, node, first_median_ns, last_max_ns, reached, lost, ambiguous,
---     loss_affected, dropped, newest_max_ns, per_root, roots, first_max_ns, last_median_ns,
---     newest_median_ns, first_p95_ns, last_p95_ns, newest_p95_ns, paths, superseded, no_output,
---     not_connected, unknown, cut_by_recording
--- answer: reached
+-- brief: first_topic, last_topic, node, first_median_ns, last_max_ns, reached (even 0), lost,
+--     ambiguous, loss_affected, dropped, newest_max_ns, per_root, roots, first_max_ns,
+--     last_median_ns, newest_median_ns, first_p95_ns, last_p95_ns, newest_p95_ns, paths,
+--     superseded, no_output, not_connected, unknown, cut_by_recording
 -- note: clocks
 WITH flow AS (
     SELECT

@@ -6,8 +6,7 @@
 --     an input is lost, the reaction waits for an output of a later one. The time window applies to
 --     the later input.
 -- grain: one row per path
--- like: e2e-latency-age
--- steps: path_chain, every_outcome
+-- reads: path_chain, every_outcome
 -- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: inputs BIGINT            Inputs in the time window
@@ -19,8 +18,7 @@
 -- column: min_ns BIGINT [ns]       Shortest reaction time
 -- column: median_ns BIGINT [ns]    Median reaction time
 -- column: mean_ns BIGINT [ns]      Mean reaction time
--- column: p95_ns BIGINT [ns]       95 % of the reaction times are at most this
--- column: p99_ns BIGINT [ns]       99 % of the reaction times are at most this
+-- column: p95_ns, p99_ns
 -- column: max_ns BIGINT [ns]       Maximum reaction time
 -- column: event_mean_ns BIGINT [ns]  Mean over events at any moment of the intervals
 -- column: sink_event, is_cut, path

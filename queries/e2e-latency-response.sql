@@ -7,8 +7,7 @@
 --     newest input of the cycle. CARET measures with --from-event publish --to-event
 --     callback_start.
 -- grain: one row per path and response time
--- like: e2e-latency-reaction
--- steps: path_chain, every_outcome, answered_input
+-- reads: path_chain, answered_input
 -- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: response VARCHAR         'all', 'best', 'worst' or 'worst-with-external-latency'
@@ -18,8 +17,7 @@
 -- column: min_ns BIGINT [ns]       Shortest
 -- column: median_ns BIGINT [ns]    Median
 -- column: mean_ns BIGINT [ns]      Mean
--- column: p95_ns BIGINT [ns]       95 % of them are at most this
--- column: p99_ns BIGINT [ns]       99 % of them are at most this
+-- column: p95_ns, p99_ns
 -- column: max_ns BIGINT [ns]       Longest
 -- column: sink_event, is_cut, path
 -- brief: path, response, count, median_ns, p99_ns, max_ns, ambiguous, p95_ns, mean_ns, min_ns

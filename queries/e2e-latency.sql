@@ -9,16 +9,8 @@
 -- variant: measure VARCHAR {latency|age|reaction|response} = 'latency'  From start to end of flows,
 --     age of the data behind an output, time until an event shows, or response times of CARET
 -- variant: by VARCHAR {path|ends} = 'path'  A row for each path, or for two topics
--- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
--- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
--- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts
---     the clock
--- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that  stops it
--- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Arrivals that count: the
---     first or last of each root, that of the newest root, or all
--- param: max_depth BIGINT {1..} = 32     Longest path
--- param: max_paths BIGINT {1..} = 1000   Most paths, shortest first, and chains of a length
--- column: run_id BIGINT            Run
+-- param: from, to, from_event, to_event, case, max_depth, max_paths
+-- column: run_id
 -- column: roots BIGINT             Flows that began in the time window
 -- column: reached BIGINT           Roots that reached the end of the path
 -- column: superseded BIGINT        Roots replaced by a newer input before they were used
@@ -39,23 +31,19 @@
 --     published before its subscription existed, and stored until then
 -- column: looped BIGINT            Later messages at the end of the path that descend from an
 --     arrival there through a loop. They are not pairs, since a path visits no subscription twice
--- column: min_ns BIGINT [ns]       Shortest latency
+-- column: min_ns
 -- column: median_ns BIGINT [ns]    Median latency
 -- column: mean_ns BIGINT [ns]      Mean latency
--- column: p95_ns BIGINT [ns]       95 % of the latencies are at most this
--- column: p99_ns BIGINT [ns]       99 % of the latencies are at most this
+-- column: p95_ns, p99_ns
 -- column: max_ns BIGINT [ns]       Longest latency
 -- column: max_root_ns BIGINT [epoch ns]  When the flow with the longest latency began
 -- column: max_take_id BIGINT       Take at its end: msgflow flow --take
--- column: sink_event VARCHAR       Event that stopped the clock: to_event, or 'take' where the
---     sink never shows a callback
--- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
+-- column: sink_event, is_cut
 -- column: reasons VARCHAR          Why roots did not reach the end of the path, with counts
--- column: path VARCHAR [path]  Nodes and topics
--- brief: path, median_ns, p99_ns, max_ns, reached, lost, ambiguous, loss_affected, dropped, roots,
---     p95_ns, superseded, no_output, reasons, not_connected, unknown, cut_by_recording, mean_ns,
---     min_ns, pairs, stored
--- answer: roots
+-- column: path
+-- brief: path, median_ns, p99_ns, max_ns, reached, lost, ambiguous, loss_affected, dropped,
+--     roots (even 0), p95_ns, superseded, no_output, reasons, not_connected, unknown,
+--     cut_by_recording, mean_ns, min_ns, pairs, stored
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE path_chain AS
 FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);

@@ -8,10 +8,7 @@
 --     kernel was traced; else at least until the next message was published, or the next timer due,
 --     and perhaps in the time that is not known.
 -- grain: one row per executor thread
--- like: scheduling-wakeup
--- column: run_id, host, nodes, process
--- column: pid INTEGER               Process id
--- column: tid
+-- column: run_id, host, nodes, process, pid, tid
 -- column: executor_kind VARCHAR     Kind of executor
 -- column: seen_ns BIGINT [ns]       Time for which the thread was seen in the time window
 -- column: wait_ns BIGINT [ns]       Waiting for work; in an events executor without a kernel trace:
@@ -30,8 +27,7 @@
 --     it
 -- column: callbacks BIGINT          Callbacks that began
 -- column: callback_share DOUBLE [share] Callback time divided by time seen, 0 to 1
--- column: executor_id BIGINT        Identity of the executor
--- column: thread_id
+-- column: executor_id, thread_id
 -- brief: nodes, tid, callback_share, callback_ns, longest_ns, longest_callback, blocked_ns,
 --     wait_ns, callbacks, select_ns, take_ns, process, pid, host, seen_ns, unknown_ns,
 --     executor_kind

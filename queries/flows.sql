@@ -2,18 +2,14 @@
 -- description: Every flow: when the callback or publication that begins it (its root) started, and
 --     when the end of the path was reached and how long that took, or why it was not.
 -- grain: one row per path and root, or per pair of root and arrival
--- like: e2e-latency, main.end_to_end
--- steps: path_chain, path_outcome, named_path
--- param: from, to, from_event, to_event, case
--- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths
+-- reads: path_outcome, named_path
+-- param: from, to, from_event, to_event, case, max_depth, max_paths
 -- column: run_id, root_kind, root_id, root_ns
 -- column: take_id BIGINT           Take at the end of the path; empty: not reached
 -- column: sink_ns
 -- column: latency_ns BIGINT [ns]   From the start of the root to the end; empty: not reached, or a
 --     message on the way was stored until its subscription existed
--- column: status VARCHAR           'reached', 'superseded', 'dropped', 'lost', 'no_output',
---     'not_connected', 'cut_by_recording' or 'unknown'
+-- column: status
 -- column: reason VARCHAR           Why it did not arrive
 -- column: is_ambiguous BOOLEAN     It passes a link that may be another one (a candidate_count
 --     above 1), so that it may be none
@@ -21,9 +17,8 @@
 -- column: size_bytes BIGINT [bytes]  Size of the message at the end; empty: no bag has it
 -- column: age_from_stamp_ns BIGINT [ns]  From header.stamp of the message at the end, which nodes
 --     pass on from the sensor's message, to the end; empty: no bag has it
--- slowest: latency_ns
--- brief: path, root_ns, latency_ns, age_from_stamp_ns, status, reason, is_ambiguous, take_id,
---     sink_ns, root_id
+-- brief: path, root_ns, latency_ns (slowest), age_from_stamp_ns, status, reason, is_ambiguous,
+--     take_id, sink_ns, root_id
 -- note: clocks
 SELECT
     f.run_id, f.root_kind, f.root_id, f.root_ns, f.take_id, f.sink_ns, f.latency_ns, f.status,

@@ -6,40 +6,37 @@
 --     overlap: a function has the time of what it calls, too. Few samples say little: of 100, a
 --     share is right within 10 points.
 -- grain: one row per callback, or process outside of callbacks, and function
--- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
--- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
--- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
--- param: without VARCHAR = NULL  Only flows through none of these
+-- param: from, to, via, without
 -- param: slowest BIGINT {1..} = NULL  Only so many flows, the slowest; where none are chosen, so
 --     many instances of each callback, the longest
--- column: run_id BIGINT            Run
+-- column: run_id
 -- column: node VARCHAR [node]      Node of the callback, or the process in brackets
 -- column: callback VARCHAR [callback]  What triggers it, or 'outside of callbacks'
 -- column: function VARCHAR         Function; '[unknown]': its file has no symbol for it
 -- column: self_share DOUBLE [share]  Part of the samples of the callback in which it ran
--- column: total_share DOUBLE [share]  Part in which it ran, or what it called
+-- column: total_share
 -- column: self_ns BIGINT [ns]      CPU time in it; empty: perf counted cycles
 -- column: total_ns BIGINT [ns]     CPU time in it, and in what it called
 -- column: per_call_ns BIGINT [ns]  total_ns for each instance of the callback
 -- column: calls BIGINT             Instances of the callback; empty outside
--- column: self_samples BIGINT      Samples in which it ran
--- column: samples BIGINT           Samples in which it ran, or what it called
+-- column: self_samples, samples
 -- column: file VARCHAR             Library or program that has it, of Python the source file
 -- column: callback_id BIGINT       Identity of the callback, of the first of several
--- column: is_internal BOOLEAN      Infrastructure of ROS
+-- column: is_internal
 -- brief: callback, function, self_share, total_share, per_call_ns, node, self_ns, samples, file
 -- note: samples
-CREATE OR REPLACE TEMP TABLE path_chain AS
+CREATE OR REPLACE TEMP TABLE function_chain AS
 FROM main.flow_chain($runs, $from, $to);
 
 CREATE OR REPLACE TEMP TABLE function_outcome AS
 FROM main.end_to_end(
-    $runs, $from, $to, 'callback_start', 'callback_end', $start_ns, $end_ns, chains := 'path_chain'
+    $runs, $from, $to, 'callback_start', 'callback_end', $start_ns, $end_ns,
+    chains := 'function_chain'
 )
 WHERE coalesce($from, $to, $via, $without) IS NOT NULL
     AND path_id IN (
         SELECT path_id
-        FROM main.flow_path($runs, only_paths := true, chains := 'path_chain')
+        FROM main.flow_path($runs, only_paths := true, chains := 'function_chain')
         WHERE main.path_visits(path, $via, $without)
     );
 
@@ -48,7 +45,7 @@ SELECT *, row_number() OVER (ORDER BY latency_ns DESC, flow_id) AS place
 FROM main.chosen_flow('function_outcome', most_flows := $slowest);
 
 CREATE OR REPLACE TEMP TABLE function_trail AS
-FROM main.end_to_end_trail('function_flow', $runs, chains := 'path_chain');
+FROM main.end_to_end_trail('function_flow', $runs, chains := 'function_chain');
 
 -- The place counts from the slowest flow that it is on the way of, or the longest instance.
 CREATE OR REPLACE TEMP TABLE function_instance AS

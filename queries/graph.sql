@@ -5,7 +5,7 @@
 --     executor stand together, and dashed (periodic_async, queue) and dotted (partial_sync,
 --     approximate_sync) arrows lead to what an indirect link causes.
 -- grain: one row per node, topic, service or action, and what the node does with it
--- column: run_id BIGINT            Run
+-- column: run_id
 -- column: kind VARCHAR             What the node does: 'publish', 'receive', 'call', 'serve', or
 --     with goals of an action 'send', 'execute'
 -- column: node VARCHAR [node]  Node
@@ -18,11 +18,11 @@
 -- column: median_ns BIGINT [ns]    Median latency: for 'receive' from publication to take, for
 --     'call' from sending the request to taking the response, for 'send' from sending the goal to
 --     taking its result
--- column: p95_ns BIGINT [ns]       95 % of these are at most this
+-- column: p95_ns
 -- column: executor VARCHAR         Executor of the node: process, host, kind and threads; empty:
 --     not known, or several
 -- column: executor_id BIGINT       Its identity
--- column: is_internal BOOLEAN      ROS uses the topic or service for itself
+-- column: is_internal
 -- brief: kind, node, name, rate_hz, median_ns, p95_ns, count, indirect, executor
 -- note: clocks
 WITH indirect AS (

@@ -2,7 +2,7 @@
 -- description: How many rows each view has for a run, from hosts to links. Empty views are listed
 --     too.
 -- grain: one row per run and view
--- column: run_id BIGINT      Run
+-- column: run_id
 -- column: object VARCHAR     View that holds the rows
 -- column: row_count BIGINT   Rows
 WITH counted AS (

@@ -3,7 +3,7 @@
 --     without an end, clocks that are apart. The worst comes first; the view finding has the cause
 --     and cure of each.
 -- grain: one row per place at which something was found
--- column: run_id BIGINT      Run
+-- column: run_id
 -- column: severity VARCHAR   error, warning or info
 -- column: name VARCHAR       What was found
 -- column: count BIGINT       How often

@@ -1,7 +1,7 @@
 -- title: Machines and containers
 -- description: The hosts of a run, and how their clocks were brought together.
 -- grain: one row per host
--- column: run_id BIGINT                       Run
+-- column: run_id
 -- column: hostname VARCHAR [host]  Name of the host
 -- column: trace_count BIGINT                  Traces recorded on it
 -- column: process_count BIGINT                Processes seen on it

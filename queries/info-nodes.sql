@@ -4,12 +4,11 @@
 --     services, an action client three of the clients. What ROS adds to every node (parameter
 --     services, /rosout, /parameter_events) is not counted.
 -- grain: one row per node
--- column: run_id BIGINT               Run
+-- column: run_id
 -- column: node VARCHAR [node]  Namespace and name
 -- column: process_name VARCHAR        Process it runs in
 -- column: pid INTEGER                 Id of that process
--- column: publisher_count BIGINT      Publishers
--- column: subscription_count BIGINT   Subscriptions
+-- column: publisher_count, subscription_count
 -- column: timer_count BIGINT          Timers
 -- column: service_count BIGINT        Services
 -- column: client_count BIGINT         Service clients

@@ -1,9 +1,9 @@
 -- title: Processes
 -- description: The processes of a run with the number of their threads and nodes.
 -- grain: one row per process life
--- column: run_id BIGINT                     Run
+-- column: run_id
 -- column: hostname VARCHAR [host]  Host it ran on
--- column: pid INTEGER                       Process id
+-- column: pid
 -- column: process_name VARCHAR              Name of the process
 -- column: tracetools_version VARCHAR        Version of tracetools it was built with
 -- column: python_version VARCHAR            Python, where callbacks of its nodes are traced

@@ -6,16 +6,15 @@
 --     last rows give the share of the whole run, also where it is 0.
 -- grain: one row per trace, process, topic or run, and measure
 -- param: all BOOLEAN = false     Also show measures with nothing affected
--- column: run_id BIGINT          Run
+-- column: run_id
 -- column: scope VARCHAR          'trace', 'process', 'topic' or 'run'
 -- column: subject VARCHAR        Path of the trace, process and host, topic, or name of the run
 -- column: measure VARCHAR        What is counted
 -- column: affected BIGINT        How many are affected; for gap_time: nanoseconds in gaps
 -- column: total BIGINT           How many there are; for gap_time: nanoseconds traced
 -- column: affected_percent DOUBLE [%]  Share affected
--- column: is_internal BOOLEAN    ROS uses the topic for itself
--- brief: scope, subject, measure, affected, total, affected_percent
--- answer: affected
+-- column: is_internal
+-- brief: scope, subject, measure, affected (even 0), total, affected_percent
 WITH gap_edge AS (
     SELECT
         run_id, trace_id, start_ns, end_ns,

@@ -4,13 +4,13 @@
 -- variant: section VARCHAR {runs|hosts|processes|nodes|counts|findings|quality} = 'runs'  What to
 --     list: runs, hosts, processes, nodes, rows per table, findings, or what share of the answers
 --     defects affect
--- column: run_id BIGINT                  Identity of the run
--- column: name VARCHAR                   Name of the run
+-- column: run_id
+-- column: name
 -- column: start_ns BIGINT [epoch ns]     First event
 -- column: end_ns BIGINT [epoch ns]       Last event
 -- column: duration_ns BIGINT [ns]        Time between them
 -- column: trace_count BIGINT             CTF traces read
--- column: event_count BIGINT             Events read
+-- column: event_count
 -- column: discarded_event_count BIGINT   Events that the tracer could not record
 -- column: msgflow_version VARCHAR        Version of msgflow that read it
 -- column: labels VARCHAR[]               What users say of it (msgflow runs label), NULL: nothing

@@ -10,7 +10,7 @@
 -- param: min_share DOUBLE = 0.95    Minimum share of publications that had a new message of a
 --     topic, for it to count as an input of a partial_sync candidate; and of those that did not
 --     wait for longer
--- column: run_id BIGINT             Run
+-- column: run_id
 -- column: kind VARCHAR              'periodic_async', 'queue', 'partial_sync', 'approximate_sync'
 --     or 'independent'
 -- column: node VARCHAR [node]  Node

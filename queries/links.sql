@@ -4,7 +4,7 @@
 --     direct and independent explain no indirect links.
 -- grain: one row per annotation
 -- variant: suggested BOOLEAN = false  Links that the data suggest, in place of those declared
--- column: run_id BIGINT             Run
+-- column: run_id
 -- column: kind VARCHAR              'periodic_async', 'partial_sync', 'approximate_sync', 'direct'
 --     or 'independent'
 -- column: source VARCHAR            'trace' or 'file'
@@ -14,7 +14,7 @@
 -- column: publications BIGINT       Publications that it explains, in the time window
 -- column: complete BIGINT           Those with a message of every input
 -- column: links BIGINT              Indirect links to them
--- column: ambiguous BIGINT          Links with more than one candidate
+-- column: ambiguous
 -- column: median_wait_ns BIGINT [ns]  Median time from the end of the input's callback to the
 --     publication
 -- column: max_wait_ns BIGINT [ns]   Longest

@@ -5,10 +5,7 @@
 -- grain: one row per object; one per process for all its timers with neither node nor callback
 -- param: kind VARCHAR {publisher|subscription|timer|service|client|action_server|action_client} =
 --     NULL  Kind of object (default: all)
--- column: run_id BIGINT             Run
--- column: host VARCHAR [host]  Host
--- column: process VARCHAR           Process name
--- column: pid INTEGER               Process id
+-- column: run_id, host, process, pid
 -- column: node VARCHAR [node]  Full name of the node; empty: not known
 -- column: kind VARCHAR              Kind of object
 -- column: name VARCHAR [topic]  Topic, service, action, or period of the timer; number of those
@@ -20,7 +17,7 @@
 -- column: symbols VARCHAR           Functions registered for its callbacks
 -- column: object_id BIGINT          Identity within its kind; of those timers, the first one's
 -- column: is_inferred BOOLEAN       Its initialisation was not recorded
--- column: is_internal BOOLEAN       Infrastructure of ROS
+-- column: is_internal
 -- brief: kind, name, node, process, pid, host, queue_depth, goals, created_ns, symbols
 WITH nameless_timer AS (
     SELECT t.run_id, t.process_id, t.timer_id, t.created_ns

@@ -10,35 +10,28 @@
 --     CPU) and executor instead. A part is negative if the next one began before it ended
 --     (overlaps).
 -- grain: one row per path, hop, part, and callback that it belongs to
--- like: e2e-latency
--- steps: path_chain, path_outcome, named_path
--- param: from, to, from_event, to_event, case
--- param: max_depth BIGINT {1..} = 32     Longest path, in topics
--- param: max_paths
+-- reads: path_chain, path_outcome, named_path
+-- param: from, to, from_event, to_event, case, max_depth, max_paths
 -- column: run_id
 -- column: path_id BIGINT           Number of the path
--- column: hop BIGINT               Number of the message on the path that it belongs or leads to
+-- column: hop
 -- column: part VARCHAR             'callback', 'cache', 'service', a layer of publishing
 --     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known),
 --     'network_or_idle', 'undecided', 'executor_busy', or exactly 'until_arrival', 'run_queue',
 --     'executor'; 'take_to_callback'
 -- column: node VARCHAR [node]  Node that runs the callback, waits for it or for the message, or
 --     publishes; 'between nodes' where neither worked: network_or_idle and until_arrival
--- column: what VARCHAR             The callback, or the topic of the message
+-- column: what
 -- column: flows BIGINT             Flows with this part
 -- column: ambiguous BIGINT         Flows of the path that pass a link that may be another one (a
 --     candidate_count above 1)
 -- column: overlaps BIGINT          Flows in which it is negative
--- column: median_ns BIGINT [ns]    Median duration
--- column: mean_ns BIGINT [ns]      Mean duration
--- column: p95_ns BIGINT [ns]       95 % of the durations are at most this
--- column: max_ns BIGINT [ns]       Longest duration
+-- column: median_ns, mean_ns, p95_ns, max_ns
 -- column: share DOUBLE [share]     Part of the time of all flows of the path, rounded to 4 places
 -- column: total_ns BIGINT [ns]     Sum over all flows; all parts add up to their time
 -- column: is_cut, path
 -- brief: path, hop, part, node, what, median_ns, share, max_ns, ambiguous, p95_ns, mean_ns,
---     total_ns, flows, overlaps
--- zero: total_ns
+--     total_ns (not 0), flows, overlaps
 -- note: clocks
 CREATE OR REPLACE TEMP TABLE breakdown_flow AS
 FROM main.chosen_flow('path_outcome', $case);

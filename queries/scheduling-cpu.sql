@@ -4,12 +4,11 @@
 --     of the CPUs are left out. Without kernel traces there are no rows. Threads that ran longest
 --     come first.
 -- grain: one row per host and thread
--- column: run_id BIGINT             Run
--- column: host VARCHAR [host]  Host
+-- column: run_id, host
 -- column: nodes VARCHAR             First two nodes of its process, and how many more; without
 --     nodes its name and id; NULL: a process without ROS
 -- column: process VARCHAR           Process name; NULL: a process without ROS
--- column: pid INTEGER               Process id
+-- column: pid
 -- column: thread VARCHAR            Thread name
 -- column: tid INTEGER               Thread id; of a process without ROS the kernel's number
 -- column: running_ns BIGINT [ns]    How long it had a CPU
@@ -18,7 +17,7 @@
 -- column: cpus BIGINT               CPUs that it ran on
 -- column: frequency_hz DOUBLE [Hz]  Mean frequency of its CPUs in the seconds in which it ran, by
 --     its time there; NULL: not recorded
--- column: thread_id BIGINT          Identity of the thread
+-- column: thread_id
 -- brief: nodes, thread, tid, share, running_ns, most_share, cpus, process, pid, frequency_hz, host
 -- note: kernel
 WITH chosen AS (

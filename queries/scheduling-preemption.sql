@@ -4,7 +4,6 @@
 --     one again, each has its time. Without kernel traces there are no rows. The longest time comes
 --     first.
 -- grain: one row per thread, priority, and thread that took the CPU from it, with its priority
--- like: scheduling-wakeup
 -- column: run_id, nodes, process
 -- column: thread VARCHAR            Thread that lost the CPU
 -- column: tid INTEGER               Its thread id

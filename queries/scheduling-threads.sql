@@ -3,7 +3,6 @@
 --     (docs/scheduling.md). Without kernel traces there are no rows. Threads that ran longest come
 --     first.
 -- grain: one row per thread with known states
--- like: executor-usage
 -- column: run_id, host, nodes, process, pid
 -- column: thread VARCHAR            Thread name
 -- column: tid
@@ -13,7 +12,7 @@
 -- column: sleeping_ns BIGINT [ns]   Waiting for something
 -- column: uninterruptible_ns BIGINT [ns]  Waiting for a page or a disk
 -- column: unknown_ns BIGINT [ns]    Not known, between known states
--- column: preemptions BIGINT        How often the CPU was taken away
+-- column: preemptions
 -- column: priority INTEGER          Most urgent priority that it ran with, as the kernel has it: 0
 --     to 99 real-time, 100 to 139 nice -20 to 19
 -- column: loss_affected BIGINT      States during which kernel events were lost

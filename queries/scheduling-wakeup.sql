@@ -3,24 +3,18 @@
 --     (docs/scheduling.md). Without the kernel's wakings there are no rows. The longest wait comes
 --     first.
 -- grain: one row per thread and priority
--- column: run_id BIGINT             Run
--- column: host VARCHAR [host]  Host
--- column: nodes VARCHAR             First two nodes of its process, and how many more; without
---     nodes its name and id
--- column: process VARCHAR           Process name
+-- column: run_id, host, nodes, process
 -- column: thread VARCHAR            Thread name
--- column: tid INTEGER               Thread id
--- column: priority INTEGER          Its priority, as the kernel has it: 0 to 99 real-time, 100 to
---     139 nice -20 to 19
+-- column: tid, priority
 -- column: is_executor BOOLEAN       It is a thread of an executor
 -- column: count BIGINT              How often it was woken in the time window
 -- column: median_ns BIGINT [ns]     Median wait
--- column: p99_ns BIGINT [ns]        99 % of the waits are at most this
+-- column: p99_ns
 -- column: max_ns BIGINT [ns]        Longest wait
 -- column: total_ns BIGINT [ns]      Sum of the waits
 -- column: meanwhile VARCHAR         Threads that had the CPU meanwhile: the three that had it
 --     longest
--- column: thread_id BIGINT          Identity of the thread
+-- column: thread_id
 -- brief: nodes, max_ns, meanwhile, median_ns, p99_ns, count, thread, tid, priority, total_ns,
 --     process, host
 -- note: kernel

@@ -6,15 +6,13 @@
 -- variant: measure VARCHAR {callbacks|threads|cpu|preemption|wakeup} = 'callbacks'  What is
 --     measured: the states of callbacks, those of threads, the CPU time of threads of all
 --     processes, who took the CPU from which thread, or how long woken threads waited for one
--- like: callbacks-each
 -- column: run_id, node, callback
 -- column: count BIGINT              Callback instances that began in the time window and ended
--- column: median_ns BIGINT [ns]     Median duration
--- column: max_ns BIGINT [ns]        Longest duration
+-- column: median_ns, max_ns
 -- column: running_median_ns BIGINT [ns]  Median CPU time
--- column: running_p99_ns BIGINT [ns]  99 % of the CPU times are at most this
+-- column: running_p99_ns
 -- column: running_max_ns BIGINT [ns]  Longest CPU time
--- column: total_ns BIGINT [ns]      Sum of the durations
+-- column: total_ns
 -- column: running_ns BIGINT [ns]    Of that, on a CPU
 -- column: preempted_ns BIGINT [ns]  Of that, ready, but another thread had the CPU
 -- column: runnable_ns BIGINT [ns]   Of that, woken, waiting for a CPU

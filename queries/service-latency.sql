@@ -6,7 +6,7 @@
 --     were traced. A request that no service was seen to take is counted with the only service of
 --     that name, if there is one.
 -- grain: one row per service and client
--- column: run_id BIGINT               Run
+-- column: run_id
 -- column: service_name VARCHAR        Service
 -- column: server VARCHAR [node]  Node of the service; empty: not known
 -- column: client VARCHAR [node]  Node of the client; empty: not known
@@ -31,7 +31,7 @@
 -- column: round_trip_max_ns BIGINT [ns]     Longest round trip
 -- column: service_id BIGINT           Identity of the service
 -- column: client_id BIGINT            Identity of the client
--- column: is_internal BOOLEAN         ROS uses the service for itself
+-- column: is_internal
 -- brief: service_name, client, round_trip_median_ns, round_trip_p99_ns, round_trip_max_ns,
 --     requests, round_trip_p95_ns, answered, server, not_taken, not_answered, not_received,
 --     callback_median_ns, wait_median_ns, request_median_ns, response_median_ns, reply_median_ns

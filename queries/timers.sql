@@ -8,12 +8,12 @@
 --     itself, or for a CPU. Calls after a gap of the trace are not counted.
 -- grain: one row per timer, called or not; one for all timers that a node made of one function and
 --     period
--- column: run_id BIGINT             Run
+-- column: run_id
 -- column: node VARCHAR [node]       Node of the timer
 -- column: callback VARCHAR [callback]  The timer, by its period
 -- column: objects BIGINT            Timers that it stands for
 -- column: period_ns BIGINT [ns]     Period asked for; empty: not in the trace
--- column: period_median_ns BIGINT [ns]  Median time from one start to the next
+-- column: period_median_ns
 -- column: rate_hz DOUBLE [Hz]       Calls per second, between the first and the last
 -- column: count BIGINT              Calls that began in the time window
 -- column: missed BIGINT             Calls that did not happen, since the one before was late by
@@ -39,10 +39,10 @@
 -- column: unknown BIGINT            Of count, those whose due moment is not known, such as the
 --     first call
 -- column: loss_affected BIGINT      Of count, those with a gap of the trace since the call before
--- column: symbol VARCHAR            Function registered for the callback
+-- column: symbol
 -- column: timer_id BIGINT           Identity of the timer, of the first of several
 -- column: callback_id BIGINT        Identity of the callback, of the first of several
--- column: is_internal BOOLEAN       Infrastructure of ROS
+-- column: is_internal
 -- brief: node, callback, count, missed, lateness_p99_ns, lateness_max_ns, off_grid, jitter_p99_ns,
 --     meanwhile, objects, busy_share, run_queue_share, lateness_median_ns, rate_hz, bunched
 -- note: callbacks

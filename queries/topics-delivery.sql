@@ -8,8 +8,7 @@
 --     overwriting from loss on the way; incompatible QoS, lifespan and best effort do not show in a
 --     trace.
 -- grain: one row per topic and subscription
--- column: run_id BIGINT             Run
--- column: topic_name VARCHAR [topic]  Topic
+-- column: run_id, topic_name
 -- column: subscriber VARCHAR [node]  Node that subscribes
 -- column: published BIGINT          Messages published on the topic in the time window
 -- column: delivered BIGINT          Of these, taken
@@ -23,11 +22,10 @@
 -- column: orphans BIGINT            Takes in the time window whose publication is not known
 -- column: reasons VARCHAR           Why messages were not taken, with counts
 -- column: orphan_reasons VARCHAR    Why publications are not known, with counts
--- column: subscription_id BIGINT    Identity of the subscription
--- column: is_internal BOOLEAN       ROS uses the topic for itself
--- brief: topic_name, subscriber, delivered, dropped, lost, reasons, not_connected, unknown,
---     delivered_percent, lost_percent, published, cut_by_recording, orphans, orphan_reasons
--- answer: delivered, dropped, lost, unknown
+-- column: subscription_id, is_internal
+-- brief: topic_name, subscriber, delivered (even 0), dropped (even 0), lost (even 0), reasons,
+--     not_connected, unknown (even 0), delivered_percent, lost_percent, published,
+--     cut_by_recording, orphans, orphan_reasons
 WITH delivery AS (
     SELECT
         d.subscription_id, count(*) AS published,

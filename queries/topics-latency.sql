@@ -5,19 +5,22 @@
 --     means that the clocks of two hosts are apart. Takes without a known publication are counted,
 --     but not measured, and neither are messages that were stored until their subscription existed.
 -- grain: one row per topic, receiving node and subscription
--- like: e2e-latency, topics-delivery
 -- column: run_id, topic_name
 -- column: subscriber VARCHAR [node]  Node that received
 -- column: takes BIGINT              Messages received in the time window
 -- column: linked BIGINT             Takes whose publication is known
 -- column: stored BIGINT             Links left out of the latencies: the message was published
 --     before the subscription existed, and stored until then
--- column: ambiguous BIGINT          Links with more than one candidate
+-- column: ambiguous
 -- column: negative BIGINT           Links with negative latency
--- column: min_ns, median_ns, mean_ns
+-- column: min_ns
+-- column: median_ns BIGINT [ns]  Median latency
+-- column: mean_ns BIGINT [ns]  Mean latency
 -- column: busy_mean_min_ns BIGINT [ns]  Part of the mean for which the executor was busy, at least
 -- column: busy_mean_max_ns BIGINT [ns]  Part of the mean for which the executor was busy, at most
--- column: p95_ns, p99_ns, max_ns, subscription_id, is_internal
+-- column: p95_ns, p99_ns
+-- column: max_ns BIGINT [ns]  Longest latency
+-- column: subscription_id, is_internal
 -- brief: topic_name, subscriber, median_ns, p99_ns, max_ns, takes, p95_ns, busy_mean_min_ns,
 --     busy_mean_max_ns, linked, stored, negative, ambiguous, mean_ns, min_ns
 -- note: clocks

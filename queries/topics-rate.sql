@@ -2,8 +2,7 @@
 -- description: How many messages each publisher published, at what rate, and how regularly. The
 --     rate is taken from the first to the last publication in the time window.
 -- grain: one row per publisher that published
--- column: run_id BIGINT             Run
--- column: topic_name VARCHAR [topic]  Topic
+-- column: run_id, topic_name
 -- column: publisher VARCHAR [node]  Node that published
 -- column: count BIGINT              Publications in the time window
 -- column: rate_hz DOUBLE [Hz]       Publications per second
@@ -13,7 +12,7 @@
 -- column: period_max_ns BIGINT [ns]     Longest time from one publication to the next
 -- column: period_deviation_ns BIGINT [ns]  Standard deviation of these times (jitter)
 -- column: publisher_id BIGINT       Identity of the publisher
--- column: is_internal BOOLEAN       ROS uses the topic for itself
+-- column: is_internal
 -- brief: topic_name, publisher, rate_hz, period_median_ns, period_deviation_ns, period_max_ns,
 --     count, period_p95_ns, period_min_ns
 WITH published AS (

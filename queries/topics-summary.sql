@@ -3,7 +3,6 @@
 --     messages, and how long they took to be taken, in the time window. The variants rate, delivery
 --     and latency say the same of each publisher and each subscription.
 -- grain: one row per topic
--- like: topics
 -- column: run_id, topic_name, publisher_count, subscription_count, publication_count
 -- column: rate_hz DOUBLE [Hz]         Publications of all publishers per second, from the first to
 --     the last
@@ -21,9 +20,9 @@
 -- column: latency_p95_ns BIGINT [ns]  95 % of the latencies are at most this
 -- column: latency_max_ns BIGINT [ns]  Longest latency
 -- column: is_internal
--- brief: topic_name, publication_count, rate_hz, period_deviation_ns, dropped, lost, reasons,
---     latency_median_ns, latency_p95_ns, latency_max_ns, delivered, unknown
--- answer: delivered, dropped, lost, unknown
+-- brief: topic_name, publication_count, rate_hz, period_deviation_ns, dropped (even 0),
+--     lost (even 0), reasons, latency_median_ns, latency_p95_ns, latency_max_ns,
+--     delivered (even 0), unknown (even 0)
 -- note: clocks
 WITH published AS (
     SELECT

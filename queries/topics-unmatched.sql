@@ -9,20 +9,18 @@
 --     lost_in_transport|pending_at_end|no_stamp|clock_set|before_tracing|publisher_gap|
 --     publisher_without_events|publisher_trace_ends|publisher_not_traced|ambiguous|
 --     unknown} = NULL  Only this reason
--- column: run_id BIGINT           Run
--- column: at_ns BIGINT [epoch ns]  Start of the publication, or the take
+-- column: run_id, at_ns
 -- column: side VARCHAR            'publication' or 'take': the side that is known
--- column: topic_name VARCHAR [topic]  Topic
+-- column: topic_name
 -- column: publisher VARCHAR [node]  Node that published; empty: not known
 -- column: subscriber VARCHAR [node]  Node that took, or should have taken
 -- column: status VARCHAR          'dropped', 'lost', 'not_connected', 'cut_by_recording',
 --     'unknown', as with --measure delivery; 'orphan': a take without a publication
--- column: reason VARCHAR          Why the other side is missing
+-- column: reason
 -- column: source_timestamp_ns BIGINT [epoch ns]  Stamp of the message
--- column: publication_id BIGINT   Identity of the publication
+-- column: publication_id
 -- column: take_id BIGINT          Identity of the take
--- column: subscription_id BIGINT  Identity of the subscription
--- column: is_internal BOOLEAN     ROS uses the topic for itself
+-- column: subscription_id, is_internal
 -- brief: at_ns, topic_name, side, status, reason, subscriber, publisher, publication_id, take_id
 WITH missing AS (
     SELECT

@@ -7,11 +7,9 @@
 --     is measured: numbers of messages, rates and periods by publisher, the latency from
 --     publication to take, what became of the messages, messages and takes without a partner, one
 --     by one, or the most important of these by topic
--- like: main.topic
 -- column: run_id
 -- column: topic_name VARCHAR [topic]  Topic
--- column: publisher_count, subscription_count, publication_count, take_count
--- column: is_internal BOOLEAN         ROS uses it for itself
+-- column: publisher_count, subscription_count, publication_count, take_count, is_internal
 -- brief: topic_name, publication_count, take_count, publisher_count, subscription_count
 SELECT
     run_id, topic_name, publisher_count, subscription_count, publication_count, take_count,

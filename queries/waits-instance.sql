@@ -5,11 +5,12 @@
 --     are left out. Where the kernel was traced, it shows when the message arrived, and for how
 --     long the thread waited for a CPU.
 -- grain: one row per callback instance that is not nested in another
--- like: callbacks-each
 -- param: callback_id BIGINT = NULL  Only instances of this callback_id (query waits lists  them)
 -- param: min_busy_ns BIGINT {0..} = 0  Only waits in which the executor may have been busy for that
 --     long [ns]
--- column: run_id, start_ns, node, callback
+-- column: run_id
+-- column: start_ns BIGINT [epoch ns]  Start of the callback
+-- column: node, callback
 -- column: since VARCHAR             Where the wait begins: 'publication', 'stamp', 'request' or
 --     'timer'; empty: not known
 -- column: wait_ns BIGINT [ns]       From there to the start of the callback
@@ -31,13 +32,12 @@
 --     CARET shows that exactly
 -- column: run_queue_ns BIGINT [ns]  From then on (else from when it can have been ready), its
 --     thread was woken and waited for a CPU, outside of callbacks; empty: not traced by the kernel
--- column: preempted_ns BIGINT [ns]  Likewise, another thread had the CPU that its thread had lost
+-- column: preempted_ns
 -- column: cpu_taken_by VARCHAR      What had the CPU in both, and for how long, the longest first
--- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
+-- column: is_loss_affected
 -- column: callback_instance_id BIGINT  Identity of the callback instance
 -- column: callback_id, is_internal
--- slowest: wait_ns
--- brief: start_ns, node, callback, wait_ns, reason, busy_max_ns, meanwhile, run_queue_ns,
+-- brief: start_ns, node, callback, wait_ns (slowest), reason, busy_max_ns, meanwhile, run_queue_ns,
 --     cpu_taken_by, preempted_ns, until_arrival_ns, busy_min_ns, since, rest_max_ns, rest_min_ns,
 --     callback_instance_id
 -- note: clocks

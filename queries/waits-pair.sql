@@ -5,11 +5,10 @@
 --     of an executor that ran the other callback at once count once, but for thread_max. Where the
 --     kernel was traced, what had the CPU while the thread waited for one has rows of its own.
 -- grain: one row per waiting callback and callback that ran meanwhile, or thread that had the CPU
--- like: path-breakdown
--- steps: exact_arrival
+-- reads: exact_arrival
 -- column: run_id
 -- column: node VARCHAR [node]  Node of the callback that waited
--- column: callback VARCHAR [callback]  What triggers it
+-- column: callback
 -- column: meanwhile_node VARCHAR [node]  Node of the callback that ran
 -- column: meanwhile_callback VARCHAR [callback]  What triggers it
 -- column: meanwhile_thread VARCHAR  Instead of a callback: thread that had the CPU for which the

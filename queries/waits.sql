@@ -11,9 +11,7 @@
 --     and period
 -- variant: by VARCHAR {callback|pair|instance} = 'callback'  What a row is: a callback that
 --     waited, with another that ran meanwhile, or one of its waits
--- like: callbacks-each
--- column: run_id, node, callback
--- column: count BIGINT              Callback instances that began in the time window
+-- column: run_id, node, callback, count
 -- column: delayed_min BIGINT        Of these, certainly kept waiting: ready while others ran
 -- column: delayed_max BIGINT        Of these, possibly kept waiting
 -- column: wait_median_ns BIGINT [ns]  Median wait, where its start is known

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from msgflow.db.finding import composed
 from msgflow.db.store_table import store_file, store_tables, table_views
 from msgflow.files.resources import resource_directory
-from msgflow.sql.header import Header, read
+from msgflow.sql.header import Header, read, vocabulary
 from msgflow.sql.quoting import identifier, literal
 from msgflow.version import __version__
 
@@ -58,10 +58,12 @@ def load(layer: str) -> tuple[Header, ...]:
 
 
 def completed(header: Header) -> Header:
-    """Fill in the columns that a header only names, from the table of the same name."""
+    """Fill in the columns that a header only names: of the table of its name, or the vocabulary."""
     if all(column.type for column in header.columns):
         return header
-    declared = store_tables()[header.name.partition(".")[2]].columns
+    declared: dict[str, Column] = {column.name: column for column in vocabulary().columns}
+    if table := store_tables().get(header.name.partition(".")[2]):
+        declared |= table.columns
     columns = (column if column.type else declared[column.name] for column in header.columns)
     return replace(header, columns=tuple(columns))
 

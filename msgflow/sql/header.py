@@ -9,17 +9,14 @@
     -- param: depth BIGINT {1..} = 32     How deep; at least 1
     -- param: bins BIGINT {1..2000} = 80     How many; at most 2000
     -- column: median_ns BIGINT [ns]  Half of the flows took no longer
-    -- brief: path, median_ns
-    -- answer: lost
-    -- heading: rank, latency_ns
+    -- brief: rank (heading), path, median_ns (slowest), lost (even 0)
     -- note: clocks
     -- when: staging.gap
     -- also: derive.a_b
-    -- unites: derive.a_c, derive.a_d
+    -- reads: path_chain, derive.a_c
+    -- next: query topics --topic {topic_name} | check
     -- variant: measure VARCHAR {latency|age} = 'latency'  What is measured
-    -- like: main.end_to_end, main.flow_path
     -- column: run_id, path_id, root_ns
-    -- steps: path_chain
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
 The name of the object is that of its file; below `schema/` the schema that the objects of its
@@ -32,33 +29,39 @@ folder are in stands before. Only what others put in front of theirs says its ki
 - `note: requests`: likewise of requests to services. The rows compare times of hosts as well.
 - `note: goals`: likewise of goals of actions.
 - `note: samples`: likewise of samples of functions. The rows compare times of hosts as well.
-- `brief`: the columns that a narrow terminal shows, the most important first.
-- `answer`: columns that stay where they are 0 in all rows, since people ask for them.
-- `heading`: columns that stand above a table on a terminal, once for each value of the first one,
-  on which the others depend.
-- `slowest`: the column that `--slowest N` goes by.
-- `zero`: the column that is 0 in rows that a terminal leaves out.
+- `brief`: the columns that a narrow terminal shows, the most important first. A mark behind one
+  says how the rows are shown on a terminal: `(heading)`, above a table, once for each value of the
+  first of these, on which the others depend; `(even 0)`, also where it is 0 in all rows, since
+  people ask for it; `(not 0)`, rows in which it is 0 are left out. `--slowest N` goes by the column
+  with the mark `(slowest)`.
 - `when`: tables, views, or macros of a run. If none of them has a row, this object has none either,
   and an ingest does not run its SQL. A condition may follow a name, as in
   `store.gap WHERE kind = 'loss'`: then only such rows count. In the model only tables count, and
   the empty table is made by its statement in `schema/model.sql`.
 - `also`: objects whose rows are stored in the table of this one, too. Each has a `when` of its own,
   so that what few recordings have is planned only there.
-- `unites`: objects whose rows a macro reads as one table. Its first argument is the name of that
-  table, its second the run. An object whose `when` finds no row is left out.
+- `reads`: tables that the statement reads, and that something else makes: a step of another query
+  of the folder, which then comes first, with what that step reads; else the program, before it runs
+  the statement. Names with a schema are objects of `schema/`: an ingest makes one table of the rows
+  of all of them, and gives its name to the macro as the first argument, the run as the second. An
+  object whose `when` finds no row is left out.
+- `next`: the command that shows more, or cures: words behind `msgflow`. `{node}` stands for the
+  value of that column in the row, as one word. Of several, with ` | ` between them, the first holds
+  whose columns all have values.
 
-- `like`: other files of the folder, of `schema/public` (main.NAME) or `queries` (queries.NAME). A
-  `param` or a `column` may be a list of names: the first of these files that has it declares it.
-- `steps`: tables that the files of `like` make. A query makes them first, and then its own.
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
   A query may have several: each value of them is one file.
 
+A `param` or `column` may be a list of names, whose meaning stands elsewhere: in the query of which
+this file is a variant (NAME-variant.sql, or NAME.sql of a lake), for a public view in the table of
+the same name, else in `schema/vocabulary.sql`. There stands what several files mean alike. A file
+in which a word means something else declares it itself.
+
 The unit of a column may also say what the column names: 'node', 'topic', 'callback', 'host' or
-'path'. Options that choose rows by them use it. In a public view over the table of the same name, a
-column may stand by its name alone: the table declares the rest. Files in `schema/health` have a
+'path'. Options that choose rows by them use it. Files in `schema/health` have a
 `severity`, a `cause` and a `cure`. An object is made after all objects that its statement, its
-`when`, its `also` or its `unites` names.
+`when`, its `also` or its `reads` names.
 
 Outside of `schema/public`, what most statements take needs no declaration: the run (`run`,
 `run_id`, or `only_run` of a macro) or `runs`; `start_ns` and `end_ns`, a window of time in epoch
@@ -79,11 +82,12 @@ What few recordings have may stand behind `WHERE $has_kernel`, or another name o
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import shlex
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 from msgflow.files.resources import resource_directory
 from msgflow.sql.value import Value, parse_literal
@@ -104,13 +108,15 @@ _STEP = re.compile(
     r"CREATE OR REPLACE TEMP TABLE (?P<table>[a-z_]+) AS\n.*?;\n+",
     re.DOTALL,
 )
+_MADE = re.compile(r"^CREATE OR REPLACE TEMP TABLE ([a-z_]+) AS$", re.MULTILINE)
+_WORD = re.compile(r"[a-z_]+")
+_PLACEHOLDER = re.compile(r"\{([a-z_]+)\}")
 _COMMENT = re.compile(r"--[^\n]*")
 # Without a word's begin, which would take twice the time. No alias ends like a schema.
 _OBJECT = re.compile(r"(?:raw|staging|store|derive|main)\.[a-z_0-9]+\b")
 _RELATION = re.compile(r"\b(?:FROM|JOIN) ([a-z_0-9]+)\b(?![.(])")
 _NEXT_SOURCE = re.compile(r", (?=[a-z]+\.)")
 _RANGE = re.compile(r"(-?\d+)\.\.(-?\d+)?")
-_REPEATABLE = ("param", "column", "variant")
 _MACRO = re.compile(r"(?:--[^\n]*\n|\s)*CREATE (?:OR REPLACE )?MACRO ")
 # The schema of the database that the objects of a folder of `schema/` are in.
 SCHEMAS = {
@@ -129,9 +135,8 @@ SCHEMAS = {
     "internal": "internal",
 }
 # Fields of a header that have the text that stands there, or the names.
-_TEXTS = ("severity", "cause", "cure", "note", "slowest", "zero")
-_LISTS = ("brief", "answer", "heading", "also", "unites")
-_Item = TypeVar("_Item", "Param", "Column")
+_TEXTS = ("severity", "cause", "cure", "note")
+_LISTS = ("also", "reads")
 
 
 class HeaderError(ValueError):
@@ -194,14 +199,15 @@ class Header:
     cure: str | None = None  # remedy for a finding, else None
     note: str | None = None
     brief: tuple[str, ...] = ()
-    answer: tuple[str, ...] = ()
-    heading: tuple[str, ...] = ()
+    answer: tuple[str, ...] = ()  # columns that a terminal shows even where all are 0
+    heading: tuple[str, ...] = ()  # columns that stand above a table
     slowest: str | None = None  # column by which rows are the slowest, else None
     zero: str | None = None  # column that is 0 in rows that a terminal leaves out, else None
     steps: tuple[Step, ...] = ()  # what a query makes before, in order
     sources: tuple[tuple[str, str], ...] = ()  # of `when`, each with its condition or ''
     also: tuple[str, ...] = ()  # objects whose rows are stored in the same table
-    unites: tuple[str, ...] = ()  # objects whose rows a macro takes together
+    reads: tuple[str, ...] = ()  # tables that others make, and objects whose rows become one
+    next: tuple[tuple[str, ...], ...] = ()  # commands, each the words behind `msgflow`
     variants: tuple[Param, ...] = ()
     # of a variant: the name of the query, and the option that chooses this one
     chosen: str | None = None
@@ -230,7 +236,12 @@ class Header:
         A name in a string counts, since a table may be given to a macro by name.
         """
         named = (name for text in self.statements for name in _OBJECT.findall(_code(text)))
-        return tuple(sorted({*named, *self.when, *self.also, *self.unites} - {self.name}))
+        return tuple(sorted({*named, *self.when, *self.also, *self.united} - {self.name}))
+
+    @property
+    def united(self) -> tuple[str, ...]:
+        """The objects of `reads`, whose rows a macro takes as one table."""
+        return tuple(name for name in self.reads if "." in name)
 
     @cached_property
     def relations(self) -> frozenset[str]:
@@ -247,12 +258,13 @@ class Header:
         """Whether there is a window of time to give."""
         return any("$start_ns" in statement for statement in self.statements)
 
-
-@dataclass(frozen=True)
-class _Field:
-    key: str
-    value: str
-    line: int
+    def next_command(self, row: Mapping[str, object]) -> tuple[str, ...] | None:
+        """Return the words behind `msgflow` of the command that shows more of a row."""
+        for words in self.next:
+            columns = _PLACEHOLDER.findall(" ".join(words))
+            if all(row.get(column) is not None for column in columns):
+                return tuple(_PLACEHOLDER.sub(lambda place: str(row[place[1]]), w) for w in words)
+        return None
 
 
 def parse(text: str, path: Path) -> Header:
@@ -262,20 +274,16 @@ def parse(text: str, path: Path) -> Header:
     """
     fields, body = _split(text, path)
     steps, body = _steps(body)
-    single = {field.key: field.value for field in fields if field.key not in _REPEATABLE}
-    # Of several files that declare a name the first counts.
-    like = [_like(name, path) for name in reversed(_names(single.get("like", "")))]
-    known_params = {param.name: param for header in like for param in header.params}
-    known_columns = {column.name: column for header in like for column in header.columns}
-    known_steps = {step.table: step for header in like for step in header.steps}
-    of_table = path.parent.name == "public"
-    params = _declared("param", fields, partial(_params, known_params), path)
-    variants = _declared("variant", fields, partial(_params, {}), path)
-    columns = _declared("column", fields, partial(_columns, known_columns, of_table), path)
-    for table in reversed(_names(single.get("steps", ""))):
-        if table not in known_steps:
-            raise _error(path, 1, f"nothing makes this table — {table}")
-        steps = (known_steps[table], *steps)
+    single = dict(fields)
+    brief = [name.partition(" ")[::2] for name in _names(single.get("brief", ""))]
+
+    def marked(mark: str) -> tuple[str, ...]:
+        return tuple(name for name, its_mark in brief if its_mark == mark)
+
+    params: tuple[Param, ...] = _declared("param", fields, _param, path)
+    columns: tuple[Column, ...] = _declared("column", fields, _column, path)
+    if "reads" in single:
+        steps = (*_read_steps(_names(single["reads"]), path), *steps)
     name = name_of(path)
     return Header(
         name=name,
@@ -289,7 +297,13 @@ def parse(text: str, path: Path) -> Header:
         path=path,
         steps=steps,
         sources=_sources(single.get("when", "")),
-        variants=variants,
+        brief=tuple(name for name, _ in brief),
+        answer=marked("(even 0)"),
+        heading=marked("(heading)"),
+        slowest=next(iter(marked("(slowest)")), None),
+        zero=next(iter(marked("(not 0)")), None),
+        variants=_declared("variant", fields, _param, path),
+        next=tuple(tuple(shlex.split(one)) for one in single.get("next", "").split(" | ") if one),
         **{key: single.get(key) for key in _TEXTS},  # type: ignore[arg-type]
         **{key: _names(single.get(key, "")) for key in _LISTS},  # type: ignore[arg-type]
     )
@@ -313,29 +327,24 @@ def relations_of(text: str) -> frozenset[str]:
     return frozenset(_RELATION.findall(_code(text)))
 
 
-def _split(text: str, path: Path) -> tuple[list[_Field], str]:
+def _split(text: str, path: Path) -> tuple[list[tuple[str, str]], str]:
     body = _HEAD.sub("", text, count=1)
-    fields: list[_Field] = []
-    for number, line in enumerate(text[: len(text) - len(body)].splitlines(), start=1):
-        if continuation := _CONTINUATION.fullmatch(line.rstrip()):
-            if not fields:
-                raise _error(path, number, "the header starts with a continuation line")
-            last = fields.pop()
+    fields: list[tuple[str, str]] = []
+    for line in map(str.rstrip, text[: len(text) - len(body)].splitlines()):
+        if fields and (continuation := _CONTINUATION.fullmatch(line)):
+            key, value = fields.pop()
             # Two spaces, so that the description of a parameter may begin on the next line.
-            gap = "  " if last.key in ("param", "variant") else " "
-            joined = f"{last.value}{gap}{continuation['value']}".strip()
-            fields.append(_Field(last.key, joined, last.line))
-        elif match := _FIELD.fullmatch(line.rstrip()):
-            fields.append(_Field(match["key"], match["value"] or "", number))
+            gap = "  " if key in ("param", "variant") else " "
+            fields.append((key, f"{value}{gap}{continuation['value']}".strip()))
+        elif match := _FIELD.fullmatch(line):
+            fields.append((match["key"], match["value"] or ""))
         else:
-            raise _error(
-                path,
-                number,
-                f"expected '-- field: value', or a continuation after four spaces, not {line!r}"
-                " (separate other comments from the header by an empty line)",
+            raise HeaderError(
+                f"{path}: expected '-- field: value', or a continuation after four spaces, not"
+                f" {line!r} (separate other comments from the header by an empty line)"
             )
     if not fields:
-        raise _error(path, 1, "there is no header")
+        raise HeaderError(f"{path}: there is no header")
     return fields, body.strip("\n") + "\n"
 
 
@@ -365,34 +374,80 @@ def _sources(text: str) -> tuple[tuple[str, str], ...]:
     return tuple((name, condition) for name, _, condition in parts)
 
 
-def _like(name: str, path: Path) -> Header:
-    room, _, stem = name.rpartition(".")
-    room = "schema/public" if room == "main" else room
-    folder = resource_directory(room) if room else path.parent
-    return _declaring(folder / f"{stem}.sql")
+def _read_steps(tables: Iterable[str], path: Path) -> tuple[Step, ...]:
+    """Return the steps of other queries that make these tables, and what those steps read."""
+    found: dict[str, Step] = {}
+    for table in tables:
+        if (maker := _makers(path.parent).get(table, path)) == path:
+            continue
+        wanted, steps = {table}, []
+        for step in reversed(_declaring(maker).steps):
+            if step.table in wanted:
+                steps.append(step)
+                wanted.update(_WORD.findall(_code(step.sql)))
+        found |= {step.table: step for step in reversed(steps)}
+    return tuple(found.values())
+
+
+@cache
+def _makers(folder: Path) -> Mapping[str, Path]:
+    """Return for each table that a step makes in a folder the file of the step."""
+    return {
+        table: path
+        for path in sorted(folder.glob("*.sql"))
+        for table in _MADE.findall(path.read_text(encoding="utf-8"))
+    }
+
+
+def vocabulary() -> Header:
+    """Return the parameters and columns that several files mean alike."""
+    return _declaring(resource_directory("schema") / "vocabulary.sql")
+
+
+def _meaning(key: str, name: str, path: Path) -> Param | Column:
+    """Return what a name means that stands alone in a file."""
+    # A table may declare the columns of a public view, and is not known here.
+    if key == "column" and path.parent.name == "public":
+        return Column(name, "", None, "")
+    base = _base(path)
+    for header in (vocabulary(),) if base is None else (_declaring(base), vocabulary()):
+        for item in header.params if key == "param" else header.columns:
+            if item.name == name:
+                return item
+    raise ValueError(f"nothing declares this {key} — {name}")
+
+
+def _base(path: Path) -> Path | None:
+    """Return the query of which a file is a variant, or which it asks of a lake."""
+    queries, name = resource_directory("queries"), path.stem.replace("_", "-")
+    if path.parent == queries:
+        name = name.rpartition("-")[0]
+    elif path.parent.parent.name != "fleet":
+        return None
+    base = queries / f"{name}.sql"
+    return base if base.exists() else None
 
 
 _declaring = cache(read)
 
 
 def _declared(
-    key: str, fields: Sequence[_Field], read_value: Callable[[str], Iterable[_Item]], path: Path
-) -> tuple[_Item, ...]:
+    key: str, fields: Iterable[tuple[str, str]], read_value: Callable[[str], Any], path: Path
+) -> tuple[Any, ...]:
     """Return what all fields of a key declare."""
-    items: list[_Item] = []
-    for field in fields:
-        if field.key == key:
-            try:
-                items += read_value(field.value)
-            except ValueError as error:
-                raise _error(path, field.line, str(error)) from None
+    items: list[Any] = []
+    for value in (value for each, value in fields if each == key):
+        try:
+            if _NAMES.fullmatch(value):
+                items += (_meaning(key, name, path) for name in _names(value))
+            else:
+                items.append(read_value(value))
+        except ValueError as error:
+            raise HeaderError(f"{path}: {error}") from None
     return tuple(items)
 
 
-def _params(known: Mapping[str, Param], text: str) -> list[Param]:
-    names = _names(text)
-    if known.keys() >= set(names):
-        return [known[name] for name in names]
+def _param(text: str) -> Param:
     match = _PARAM.fullmatch(text)
     if match is None or (match["default"] is not None and len(match["gap"]) < 2):
         raise ValueError(
@@ -407,32 +462,20 @@ def _params(known: Mapping[str, Param], text: str) -> list[Param]:
         minimum, choices = int(limits[1]), ()
         maximum = int(limits[2]) if limits[2] else None
     default = None if match["default"] is None else parse_literal(match["default"])
-    return [
-        Param(
-            name=match["name"],
-            type=match["type"],
-            default=default,
-            has_default=match["default"] is not None,
-            description=" ".join(match["description"].split()),
-            choices=choices,
-            minimum=minimum,
-            maximum=maximum,
-        )
-    ]
+    return Param(
+        name=match["name"],
+        type=match["type"],
+        default=default,
+        has_default=match["default"] is not None,
+        description=" ".join(match["description"].split()),
+        choices=choices,
+        minimum=minimum,
+        maximum=maximum,
+    )
 
 
-def _columns(known: Mapping[str, Column], of_table: bool, text: str) -> list[Column]:
-    if _NAMES.fullmatch(text):
-        unknown = [name for name in _names(text) if name not in known]
-        # Of a public view its table may declare them.
-        if unknown and not of_table:
-            raise ValueError(f"nothing declares this column — {unknown[0]}")
-        return [known.get(name, Column(name, "", None, "")) for name in _names(text)]
+def _column(text: str) -> Column:
     match = _COLUMN.fullmatch(text)
     if match is None:
         raise ValueError(f"expected '-- column: name TYPE [unit]  description', not {text!r}")
-    return [Column(match["name"], match["type"], match["unit"], match["description"])]
-
-
-def _error(path: Path, line: int, message: str) -> HeaderError:
-    return HeaderError(f"{path}:{line}: {message}")
+    return Column(match["name"], match["type"], match["unit"], match["description"])

@@ -14,7 +14,7 @@
 --     is_cached: the last step of each beginning
 -- param: reached VARCHAR  Name of rows of path_id, root_key, take_id: how far roots came
 -- param: arrived VARCHAR  Name of rows of path_id, take_id: takes at which paths ended
--- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
+-- param: has_calls
 -- param: has_states BOOLEAN = true  Nodes are managed; false: no state of one is looked up
 CREATE OR REPLACE MACRO derive.stuck_root(
     missing, lineages, prefixes, reached, arrived, runs, has_calls := true, has_states := true

@@ -1,16 +1,14 @@
 -- description: Action clients: three clients of services and two subscriptions (action_server).
 -- grain: one row per action client
--- column: run_id BIGINT  Run that the row belongs to
+-- column: run_id
 -- column: action_client_id BIGINT  Identity of the action client: that of its client of send_goal
--- column: process_id BIGINT  Process it lives in
--- column: node_id BIGINT  Node it belongs to
--- column: action_name VARCHAR  Name of the action
+-- column: process_id, node_id, action_name
 -- column: cancel_client_id BIGINT  Its client of cancel_goal
 -- column: result_client_id BIGINT  Its client of get_result
 -- column: feedback_subscription_id BIGINT  Its subscription to feedback, of the goals of all
 --     clients
 -- column: status_subscription_id BIGINT  Its subscription to the states of all goals
--- column: created_ns BIGINT [epoch ns]  When it was created
+-- column: created_ns
 -- column: goal_count BIGINT  Goals that it sent; NULL: requests have no events in the traces of its
 --     host (before Kilted)
 WITH sent AS (

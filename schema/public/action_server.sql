@@ -1,16 +1,14 @@
 -- description: Action servers. An action is three services and two topics: NAME/_action/send_goal,
 --     cancel_goal and get_result, NAME/_action/feedback and status.
 -- grain: one row per action server
--- column: run_id BIGINT  Run that the row belongs to
+-- column: run_id
 -- column: action_server_id BIGINT  Identity of the action server: that of its service send_goal
--- column: process_id BIGINT  Process it lives in
--- column: node_id BIGINT  Node it belongs to
--- column: action_name VARCHAR  Name of the action
+-- column: process_id, node_id, action_name
 -- column: cancel_service_id BIGINT  Its service cancel_goal
 -- column: result_service_id BIGINT  Its service get_result
 -- column: feedback_publisher_id BIGINT  Its publisher of feedback
 -- column: status_publisher_id BIGINT  Its publisher of the states of its goals
--- column: created_ns BIGINT [epoch ns]  When it was created
+-- column: created_ns
 -- column: goal_count BIGINT  Goals that it took; NULL: requests have no events in the traces of its
 --     host (before Kilted)
 -- column: feedback_count BIGINT  Feedback messages that it published, of all goals

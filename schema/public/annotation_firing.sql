@@ -3,9 +3,9 @@
 --     partial_sync and approximate_sync: only publications from callback instances of inputs; all
 --     of one instance are one firing.
 -- grain: one row per annotation and publication that it applies to
--- column: run_id BIGINT  Run that the row belongs to
+-- column: run_id
 -- column: annotation_id BIGINT  The annotation
--- column: publication_id BIGINT  The publication
+-- column: publication_id
 -- column: callback_instance_id BIGINT  Callback instance that published; NULL: none
 -- column: input_count BIGINT  Inputs of the annotation
 -- column: linked_count BIGINT  Inputs with a message

@@ -8,9 +8,9 @@
 --     woke the middleware's (some 10 to 100 us before they were in the queue).
 -- grain: one row per take whose publication is known, and before which its thread was woken or the
 --     message seen to arrive
--- column: run_id BIGINT  Run that the row belongs to
--- column: take_id BIGINT  The take
--- column: publication_id BIGINT  The publication
+-- column: run_id
+-- column: take_id BIGINT  Identity of the take
+-- column: publication_id
 -- column: arrived_ns BIGINT [epoch ns]  When the thread was woken, or the listener had the message
 -- column: waker_kind VARCHAR  'thread', 'timer', 'interrupt' or 'softirq'; 'listener': it tells of
 --     the message, not of the thread, which may have been busy (main.data_arrival)

@@ -1,8 +1,7 @@
 -- description: Answers count some callbacks as one: a node may make many timers of one function
 --     and period, such as a one-shot timer for each event. Every other callback counts alone.
 -- grain: one row per callback object
--- column: callback_id BIGINT  Identity of the callback
--- column: run_id BIGINT  Run that the row belongs to
+-- column: callback_id, run_id
 -- column: alike_id BIGINT  The first of those like it
 -- column: objects BIGINT  How many there are of them, with itself
 SELECT

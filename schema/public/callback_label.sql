@@ -2,11 +2,10 @@
 --     Subscription(/scan), and the node that it belongs to. Timers of unknown period are
 --     distinguished by their handles. Functions of Python have their names.
 -- grain: one row per callback object
--- column: callback_id BIGINT  Identity of the callback
--- column: run_id BIGINT  Run that the row belongs to
+-- column: callback_id, run_id
 -- column: node VARCHAR  Full name of the node, or the name and pid of the process in brackets
 -- column: label VARCHAR  What triggers it
--- column: is_internal BOOLEAN  Infrastructure of ROS
+-- column: is_internal
 SELECT
     c.callback_id, c.run_id,
     main.node_label(n.full_name, p.name, p.pid) AS node,

@@ -2,18 +2,14 @@
 --     main.callback_instance, each with its callback, node, process, host and thread.
 -- grain: one row per callback instance
 -- column: callback_instance_id BIGINT  Identity of the callback instance
--- column: run_id BIGINT  Run that the row belongs to
+-- column: run_id
 -- column: start_ns BIGINT [epoch ns]  callback_start
 -- column: duration_ns BIGINT [ns]  From its start to its end; NULL: never seen to end
 -- column: node VARCHAR  Full name of the node, or the name and pid of the process in brackets
 -- column: callback VARCHAR  What triggers it
--- column: process VARCHAR  Process name
--- column: pid INTEGER  Process id
--- column: tid INTEGER  Thread id
--- column: host VARCHAR  Host
--- column: callback_id BIGINT  Callback that ran
+-- column: process, pid, tid, host, callback_id
 -- column: take_id BIGINT  Message it was called with
--- column: is_internal BOOLEAN  Infrastructure of ROS
+-- column: is_internal
 SELECT
     i.callback_instance_id, i.run_id, i.start_ns,
     i.end_ns - i.start_ns AS duration_ns,

@@ -3,13 +3,12 @@
 --     shortest delays in both directions bound the error of a correction. A negative one shows that
 --     the clocks are apart.
 -- grain: one row per pair of clocks and direction with messages or packets
--- column: run_id BIGINT  Run that the row belongs to
+-- column: run_id
 -- column: from_clock_id BIGINT  Clock of the senders
 -- column: to_clock_id BIGINT  Clock of the receivers
 -- column: message_count BIGINT  Messages, requests and responses of ROS
 -- column: packet_count BIGINT  Network packets that kernel traces saw on both ends
--- column: shortest_message_ns BIGINT [ns]  Shortest delay of a message, after correction
--- column: shortest_packet_ns BIGINT [ns]  Shortest delay of a packet, after correction
+-- column: shortest_message_ns, shortest_packet_ns
 WITH way AS (
     SELECT
         w.run_id, w.from_clock_id, w.to_clock_id, w.is_packet,

@@ -9,8 +9,7 @@
 -- grain: one row per thing compared and statistic; things that only one run has, too
 -- param: what VARCHAR  'paths' (end-to-end latency), 'ends' (the same between two topics, by any
 --     path), 'callbacks' (duration) or 'topics' (from publication to take)
--- param: run_a BIGINT  Run that the other one is compared with
--- param: run_b BIGINT  The other one
+-- param: run_a, run_b
 -- param: from_topic VARCHAR = NULL  Topics or nodes where paths start: names or globs, separated
 --     by commas; NULL: any
 -- param: to_topic VARCHAR = NULL  Topics or nodes where paths end, in the same form; NULL: any
@@ -19,28 +18,22 @@
 -- param: skip_ns BIGINT = 0  Time left out at the start of each run, or of its window
 -- param: a_window BIGINT[] = NULL  Begin and end of a time window of run A, epoch ns; NULL: all of
 --     it
--- param: b_window BIGINT[] = NULL  The same for run B
+-- param: b_window
 -- param: confidence DOUBLE = 0.95  Share of intervals that would contain the true difference
 -- param: at_least DOUBLE = 0.05  Smallest difference that counts as one, as a share of A
 -- param: resamples BIGINT = 1000  Number of resamples for the interval
--- param: seed BIGINT = 0  Random seed
+-- param: seed
 -- param: internal BOOLEAN = false  Include what ROS does for itself
--- param: max_depth INTEGER = 32  Longest path, in topics
--- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
---     chains of each length
--- column: statistic VARCHAR  'median', 'mean', 'p95', 'p99' or 'max'
+-- param: max_depth, max_paths
+-- column: statistic
 -- column: a_ns BIGINT [ns]  Its value in run A
 -- column: b_ns BIGINT [ns]  Its value in run B
--- column: difference_ns BIGINT [ns]  B less A
--- column: change_percent DOUBLE  Difference in percent of A; NULL where A is not positive
--- column: low_ns BIGINT [ns]  Lower end of the confidence interval of the difference
--- column: high_ns BIGINT [ns]  Its upper end
+-- column: difference_ns, change_percent, low_ns, high_ns
 -- column: verdict VARCHAR  'B is longer' or 'B is shorter', of these two recordings, where both
 --     ends have one sign; 'about equal' where they have, and the difference is less than at_least;
 --     'no difference shown', 'too few values' or 'too few independent values'
 --     for an interval, 'too few resamples', 'not estimated' (maximum), 'only in A' or 'only in B'
--- column: a_count BIGINT  Values of run A
--- column: b_count BIGINT  Values of run B
+-- column: a_count, b_count
 -- column: a_independent BIGINT  How many independent values the values of run A are worth for this
 --     statistic: their number divided by how many in a row are alike; NULL if that cannot be
 --     estimated, since they are alike for too long

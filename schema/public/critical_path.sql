@@ -6,18 +6,17 @@
 --     traced, what a thread did is divided into its states. The pieces add up to the latency. A
 --     negative part is one piece.
 -- grain: one row per piece of the flow
--- like: main.critical_piece, main.end_to_end_part
--- param: runs BIGINT[]  Runs to look at
--- param: from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns, sink_take_id,
---     max_depth, max_paths
+-- param: runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
+--     sink_take_id, max_depth, max_paths
 -- param: most_flows INTEGER = 1  How many of the longest flows
 -- param: at_quantile
 -- param: path_ids BIGINT[] = NULL  Only flows of these paths; NULL: all
--- param: flow_case VARCHAR = 'first'  Pairs of root and arrival that count: 'first', 'last',
---     'newest' or 'every_pair'
--- column: run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
---     activity, from_ns, to_ns, duration_ns, is_certain, callback_instance_id, publication_id,
---     state, wakers, state_thread_id, priority, by_kind, by_thread_id, by_other_thread_id,
+-- param: flow_case
+-- column: run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position
+-- column: part VARCHAR  Part of the flow, as in main.end_to_end_part
+-- column: activity, from_ns, to_ns, duration_ns, is_certain, callback_instance_id
+-- column: publication_id BIGINT  Message that is published, under way or waited for
+-- column: state, wakers, state_thread_id, priority, by_kind, by_thread_id, by_other_thread_id,
 --     by_priority, request_id
 CREATE OR REPLACE MACRO main.critical_path(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',

@@ -3,38 +3,14 @@
 --     services in a callback (main.waited_call) by what the service did. Where the kernel was
 --     traced, what a thread did is divided into its states (main.schedule_piece).
 -- grain: one row per piece of a flow
--- like: main.end_to_end_part, main.schedule_piece
 -- param: parts VARCHAR  Name of the rows of main.end_to_end_part: a table, or a part of the query
--- param: runs BIGINT[]  Runs that they are of
--- param: waits VARCHAR = 'wait_here'  Name of a table of when inputs became ready, by the clocks of
---     the executors, where there is one
--- param: has_kernel BOOLEAN = true  A kernel trace was read; false: nothing is looked up in it
--- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
--- param: has_teams BOOLEAN = true  Executors have several threads; false: each has one
--- column: run_id, path_id, root_kind, root_id, take_id, latency_ns
--- column: flow_rank BIGINT  Number of the flow, the longest first
--- column: hop BIGINT  Number of the message on the path that it belongs or leads to
--- column: position
+-- param: runs, waits, has_kernel, has_calls, has_teams
+-- column: run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position
 -- column: part VARCHAR  Part of the flow, as in main.end_to_end_part
--- column: activity VARCHAR  What happened: the part itself; up to a take 'network_or_idle',
---     'executor_busy' (it ran something else), 'all_threads_busy', 'blocked' (a callback ran that
---     excludes the waiting one) or 'undecided' (nothing shows when the message arrived); in a cache
---     'timer' (not due yet), 'unpublished' (the message that was waited for), or a part of that
---     message's own flow
--- column: from_ns, to_ns, duration_ns
--- column: is_certain BOOLEAN  For 'executor_busy', 'all_threads_busy' and 'blocked': what waited
---     was ready by then; false: it may have arrived meanwhile. NULL for others
--- column: callback_instance_id
+-- column: activity, from_ns, to_ns, duration_ns, is_certain, callback_instance_id
 -- column: publication_id BIGINT  Message that is published, under way or waited for
--- column: state VARCHAR  State of the thread, as in main.schedule_piece; NULL: not traced by the
---     kernel, or no thread's doing
--- column: wakers BIGINT  How many wakers lead to the thread: 0 for the one that the piece is of
--- column: state_thread_id BIGINT  The thread in that state
--- column: priority INTEGER  Its priority, as the kernel has it: 0 to 99 real-time, 100 to 139 nice
--- column: by_kind VARCHAR  What took the CPU, or ended the sleep: 'thread', 'timer', 'interrupt' or
---     'softirq'. NULL: not known, or the state needs none
--- column: by_thread_id, by_other_thread_id, by_priority
--- column: request_id BIGINT  Request whose response the callback of the part waits for
+-- column: state, wakers, state_thread_id, priority, by_kind, by_thread_id, by_other_thread_id,
+--     by_priority, request_id
 CREATE OR REPLACE MACRO main.critical_piece(
     parts, runs, waits := 'wait_here', has_kernel := true, has_calls := true, has_teams := true
 ) AS TABLE

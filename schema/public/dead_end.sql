@@ -8,8 +8,8 @@
 --     the node also publishes on, and inputs of annotations are left out.
 -- grain: one row per such subscription, publisher of its node, and timer or subscription whose
 --     callbacks published; one row for what it published outside of callbacks
--- param: runs BIGINT[]  Runs to look at
--- column: run_id BIGINT  Run
+-- param: runs
+-- column: run_id
 -- column: node_id BIGINT  Node
 -- column: subscription_id BIGINT  Subscription at which flows end
 -- column: topic_name VARCHAR  Its topic

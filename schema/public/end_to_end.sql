@@ -8,28 +8,13 @@
 --     recorded for longer than any flow of the path took. It also cuts a root whose message has an
 --     unknown status where no earlier or no later message passed the step.
 -- grain: one row per path, root and take at the sink; one per path and root that did not reach it
--- like: main.flow_chain, main.end_to_end_between
--- param: runs, from_topic, to_topic
--- param: from_event VARCHAR = 'callback_start'  Event that starts the clock: 'callback_start' or
---     'publish'; others are an error
--- param: to_event VARCHAR = 'callback_end'  Event that stops it: 'take', 'callback_start' or
---     'callback_end'; others are an error
--- param: window_start_ns BIGINT = NULL  Start of the time window of roots, epoch ns; NULL: any
--- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive;
---     NULL: any
--- param: max_depth, max_paths
--- param: chains VARCHAR = 'chain_here'  Name of a table with the rows of main.flow_chain for the
---     same arguments, where there is one
--- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
+-- param: runs, from_topic, to_topic, from_event, to_event, window_start_ns, window_end_ns,
+--     max_depth, max_paths, chains, has_calls
 -- param: has_gaps BOOLEAN = true  The recording has gaps; false: none is looked up
 -- param: has_states BOOLEAN = true  Nodes are managed; false: no state of one is looked up
--- column: run_id
--- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
--- column: root_kind, root_id, root_ns
+-- column: run_id, path_id, root_kind, root_id, root_ns
 -- column: take_id BIGINT  Take at the end of the path; NULL: not reached
--- column: sink_event VARCHAR  Event that ended the flow: to_event, or 'take' where the sink never
---     shows a callback
--- column: sink_ns
+-- column: sink_event, sink_ns
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end; NULL: it did not arrive,
 --     or a message on its way was stored (main.link_transport)
 -- column: status VARCHAR  'reached'; 'superseded' (a newer input took its place in a cache);
@@ -41,8 +26,7 @@
 -- column: is_first, is_last, is_newest
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time, from the root to the end;
 --     if it did not arrive, as long as the longest flow of the path took
--- column: is_ambiguous BOOLEAN  It passes a link that may be another one (a candidate_count above
---     1)
+-- column: is_ambiguous
 CREATE OR REPLACE MACRO main.end_to_end(
     runs, from_topic := NULL, to_topic := NULL, from_event := 'callback_start',
     to_event := 'callback_end', window_start_ns := NULL, window_end_ns := NULL, max_depth := 32,

@@ -7,21 +7,15 @@
 --     receiving node and root that did not arrive
 -- param: arrivals VARCHAR  Name of rows of run_id, path, first_topic, last_topic, and all columns
 --     of main.end_to_end but path_id: a table, or a part of the query
--- column: run_id BIGINT  Run
--- column: first_topic VARCHAR [topic]  Topic of the first message
--- column: last_topic VARCHAR [topic]  Topic of the last message
+-- column: run_id, first_topic, last_topic
 -- column: node VARCHAR [node]  Node that takes it
--- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
--- column: root_id BIGINT  Identity of the root
--- column: root_ns BIGINT [epoch ns]  Start of the root
--- column: take_id BIGINT  Take at the end; NULL: not reached
--- column: sink_ns BIGINT [epoch ns]  End of the flow
+-- column: root_kind, root_id, root_ns
+-- column: take_id BIGINT  Take at the end of the path; NULL: not reached
+-- column: sink_ns
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end; NULL: it did not arrive,
 --     or a message on its way was stored
 -- column: status VARCHAR  'reached', or why not, as in main.end_to_end
--- column: is_first BOOLEAN  First arrival of the root; NULL: it did not arrive
--- column: is_last BOOLEAN  Last arrival of the root; NULL: it did not arrive
--- column: is_newest BOOLEAN  Newest root of the arrival; NULL: it did not arrive
+-- column: is_first, is_last, is_newest
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time
 -- column: is_ambiguous BOOLEAN  All its paths pass a link that may be another one
 CREATE OR REPLACE MACRO main.end_to_end_between(arrivals) AS TABLE

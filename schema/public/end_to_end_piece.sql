@@ -1,11 +1,11 @@
 -- description: The parts of flows: the last step of main.end_to_end_part.
 -- grain: one row per flow and part
--- like: main.end_to_end_part
--- param: flows VARCHAR  Name of the rows of main.end_to_end_flow: a table, or a part of the query
--- param: trail VARCHAR  Likewise of main.end_to_end_trail
--- param: runs BIGINT[]  Runs that they are of
--- column: run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, position, part,
---     from_ns, to_ns, duration_ns, callback_instance_id, publication_id
+-- param: flows, trail, runs
+-- column: run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns
+-- column: hop BIGINT  Number of the message on the path that it belongs or leads to; one more than
+--     the last for the callback at the end
+-- column: position, part, from_ns, to_ns, duration_ns, callback_instance_id
+-- column: publication_id BIGINT  Message that is published or under way
 CREATE OR REPLACE MACRO main.end_to_end_piece(flows, trail, runs) AS TABLE
 WITH every_callback_instance AS NOT MATERIALIZED (
     SELECT

@@ -2,18 +2,20 @@
 --     the executor was busy with other callbacks while the message waited. A parameter gives the
 --     callback instances, so that they need not be looked up for each part.
 -- grain: one row per flow and part
--- like: main.end_to_end_part
--- param: flows VARCHAR  Name of the rows of main.end_to_end_flow: a table, or a part of the query
--- param: trail VARCHAR  Likewise of main.end_to_end_trail
+-- param: flows, trail
 -- param: callbacks VARCHAR  Likewise of all callback instances of these runs:
 --     callback_instance_id, callback_id, take_id, start_ns and end_ns of main.callback_instance,
 --     busy_min_ns and busy_max_ns of main.executor_wait (NULL: not known)
--- param: runs BIGINT[]  Runs that they are of
+-- param: runs
 -- param: has_turns BOOLEAN = true  Flows may lead through caches or services; false: none does
--- column: run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, position
+-- column: run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns
+-- column: hop BIGINT  Number of the message on the path that it belongs or leads to; one more than
+--     the last for the callback at the end
+-- column: position
 -- column: rank BIGINT  Order within the hop, from 1
--- column: part, from_ns, to_ns, duration_ns, callback_instance_id, publication_id
--- column: callback_id BIGINT  Its callback
+-- column: part, from_ns, to_ns, duration_ns, callback_instance_id
+-- column: publication_id BIGINT  Message that is published or under way
+-- column: callback_id
 -- column: busy_min_ns BIGINT [ns]  Least time for which its executor was busy with other callbacks
 --     while a message or request waited
 -- column: busy_max_ns BIGINT [ns]  Most time

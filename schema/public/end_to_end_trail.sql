@@ -1,14 +1,10 @@
 -- description: The messages on the way of each flow (main.end_to_end_flow), from its root to its
 --     end. Of several ways it is that whose list of publications, then of takes, comes first.
 -- grain: one row per flow and message on its way
--- like: main.flow_chain
--- param: flows VARCHAR  Name of the rows of main.end_to_end_flow: a table, or a part of the query
--- param: runs, from_topic, to_topic, max_depth, max_paths
--- param: chains VARCHAR = 'chain_here'  Name of a table with the rows of main.flow_chain for the
---     same arguments, where there is one
+-- param: flows, runs, from_topic, to_topic, max_depth, max_paths, chains
 -- column: flow_id BIGINT  Number of the flow
 -- column: hop BIGINT  Number of the message on the path
--- column: take_id BIGINT  Take of the message
+-- column: take_id BIGINT  Identity of the take
 -- column: publication_id BIGINT  The message; below 0: its publisher is not traced
 -- column: previous_take_id BIGINT  Take of the message before it; NULL: none
 -- column: next_take_id BIGINT  Take of the message after it; NULL: none

@@ -7,11 +7,9 @@
 --     cannot be inside it. Activities of a thread never overlap, add up to its states, and never
 --     reach across a gap.
 -- grain: one row per interval of a thread in which nothing changed
--- column: run_id BIGINT  Run that the row belongs to
--- column: executor_id BIGINT  Executor
--- column: thread_id BIGINT  Thread it happened on
+-- column: run_id, executor_id, thread_id
 -- column: activity VARCHAR  'wait', 'select', 'take', 'callback', 'service' or 'blocked'
--- column: start_ns BIGINT [epoch ns]  Begin
+-- column: start_ns
 -- column: end_ns BIGINT [epoch ns]  End; NULL: not known (the last, or a gap follows)
 -- column: callback_instance_id BIGINT  Innermost callback that ran
 FROM main.executor_activity_within(NULL, NULL, NULL)

@@ -2,9 +2,14 @@
 --     selected from all. What began before, and has no end since a gap follows, is among them only
 --     if the gap ends in the window or later.
 -- grain: one row per interval of a thread in which nothing changed
--- like: main.executor_activity, main.executor_pause
--- param: runs, window_start_ns, window_end_ns
--- column: run_id, executor_id, thread_id, activity, start_ns, end_ns, callback_instance_id
+-- param: runs BIGINT[]  Runs to look at; NULL: all
+-- param: window_start_ns BIGINT  Begin of the window, epoch ns; NULL: from the first event
+-- param: window_end_ns BIGINT  End of the window, epoch ns, exclusive; NULL: to the last event
+-- column: run_id, executor_id, thread_id
+-- column: activity VARCHAR  'wait', 'select', 'take', 'callback', 'service' or 'blocked'
+-- column: start_ns
+-- column: end_ns BIGINT [epoch ns]  End; NULL: not known (the last, or a gap follows)
+-- column: callback_instance_id BIGINT  Innermost callback that ran
 CREATE OR REPLACE MACRO main.executor_activity_within(runs, window_start_ns, window_end_ns) AS TABLE
 WITH activity AS (
     SELECT

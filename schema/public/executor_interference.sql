@@ -2,11 +2,11 @@
 --     one thread add up to the time for which it was busy; overlaps on several threads may lie side
 --     by side in time.
 -- grain: one row per waiting callback instance and one that its executor was busy with meanwhile
--- column: run_id BIGINT  Run that the row belongs to
+-- column: run_id
 -- column: callback_instance_id BIGINT  Callback instance that waited
 -- column: meanwhile_id BIGINT  Callback instance that the executor was busy with
 -- column: meanwhile_callback_id BIGINT  Its callback
--- column: executor_id BIGINT  Their executor
+-- column: executor_id
 -- column: thread_id BIGINT  Thread that was busy
 -- column: overlap_ns BIGINT [ns]  Overlap from earliest_ns of the wait on (from latest_ns if that
 --     is unknown)

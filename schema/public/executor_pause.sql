@@ -4,11 +4,9 @@
 -- param: runs BIGINT[]  Runs to look at; NULL: all
 -- param: window_start_ns BIGINT  Begin of the window, epoch ns; NULL: from the first event
 -- param: window_end_ns BIGINT  End of the window, epoch ns, exclusive; NULL: to the last event
--- column: run_id BIGINT  Run that the row belongs to
--- column: thread_id BIGINT  Thread it happened on
+-- column: run_id, thread_id
 -- column: activity VARCHAR  'wait' or 'select'
--- column: start_ns BIGINT [epoch ns]  Begin
--- column: end_ns BIGINT [epoch ns]  End
+-- column: start_ns, end_ns
 CREATE OR REPLACE MACRO main.executor_pause(runs, window_start_ns, window_end_ns) AS TABLE
 WITH pause AS (
     SELECT

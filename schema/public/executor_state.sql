@@ -1,10 +1,6 @@
 -- description: What executor threads did, as their three events say.
 -- grain: one row per interval between two executor events of a thread
--- column: run_id
--- column: executor_id BIGINT  Executor
--- column: thread_id
--- column: state
--- column: start_ns
+-- column: run_id, executor_id, thread_id, state, start_ns
 -- column: end_ns BIGINT [epoch ns]  Next executor event of the thread; NULL: not known (the last,
 --     a gap follows, or the recording leaves out events that end states)
 -- column: callback_instance_id

@@ -3,14 +3,15 @@
 --     at once take hardly longer than one of them. Where a kernel trace or CARET shows exactly
 --     when a message arrived (main.arrival), it was ready then: the bounds are one.
 -- grain: one row per callback instance that is not nested in another
--- like: main.executor_wait, main.critical_piece
--- param: runs BIGINT[]  Runs to look at
+-- param: runs
 -- param: arrivals VARCHAR = 'arrival_here'  Name of a table with take_id, until_arrival_ns,
 --     run_queue_ns and executor_ns of the exact rows of main.arrival, where there is one
 -- param: waits, has_kernel, has_teams
--- column: run_id, callback_instance_id, executor_id, thread_id, callback_id, since, origin_ns,
---     earliest_ns, latest_ns, start_ns, wait_ns, busy_min_ns, busy_max_ns, blocked_max_ns, idle_ns,
---     is_loss_affected, held_max_ns
+-- column: run_id
+-- column: callback_instance_id BIGINT  Callback instance that waited
+-- column: executor_id, thread_id, callback_id, since, origin_ns, earliest_ns, latest_ns
+-- column: start_ns BIGINT [epoch ns]  callback_start
+-- column: wait_ns, busy_min_ns, busy_max_ns, blocked_max_ns, idle_ns, is_loss_affected, held_max_ns
 -- column: meanwhile_callback_ids BIGINT[]  Callbacks that ran meanwhile, the longest first;
 --     NULL: none
 -- column: meanwhile_ns BIGINT[] [ns]  For how long each of them did, from earliest_ns on (from
@@ -22,7 +23,7 @@
 --     where a kernel trace or CARET shows that exactly; else NULL
 -- column: run_queue_ns BIGINT [ns]  From earliest_ns on (from latest_ns if that is unknown), its
 --     thread was woken and waited for a CPU, outside of callbacks; NULL: not traced by the kernel
--- column: preempted_ns BIGINT [ns]  Likewise, another thread had the CPU that its thread had lost
+-- column: preempted_ns
 -- column: cpu_taken_by VARCHAR[]  Threads that had the CPU in both, the longest first; NULL: none
 -- column: cpu_taken_ns BIGINT[] [ns]  For how long each of them did
 CREATE OR REPLACE MACRO main.executor_wait_explained(

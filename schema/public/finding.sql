@@ -1,18 +1,12 @@
 -- description: Things worth knowing about the input or the recording before trusting a number: lost
 --     events, objects not seen to be created, clocks apart.
 -- grain: one row per place at which something was found
--- column: run_id
--- column: trace_id
--- column: name
+-- column: run_id, trace_id, name
 -- column: phase VARCHAR  What it is about: 'input' or 'recording'
 -- column: severity VARCHAR  'error' where results are wrong or missing, 'warning' where they may
 --     be, or 'info'
 -- column: subject VARCHAR  Where: a trace, process, host, topic
--- column: count
--- column: detail
--- column: cause VARCHAR  Where it comes from, as a rule
--- column: cure VARCHAR  What to do about it
--- column: title VARCHAR  What was found
+-- column: count, detail, cause, cure, title
 -- column: description VARCHAR  What it means for results
 SELECT
     f.run_id, f.trace_id, f.name, k.phase, k.severity,

@@ -1,8 +1,8 @@
 -- description: Everything that caused a publication, take, callback instance, request or response,
 --     directly or through other things, and the thing itself.
 -- grain: one row per vertex
--- like: main.flow_forward
--- param: start_kind, start_id, max_depth
+-- param: start_kind, start_id
+-- param: max_depth INTEGER = NULL  Maximum number of steps; NULL: no limit
 -- column: kind, id
 CREATE OR REPLACE MACRO main.flow_backward(start_kind, start_id, max_depth := NULL) AS TABLE
 SELECT kind, id

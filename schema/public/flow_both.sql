@@ -2,8 +2,8 @@
 --     response, all that it caused, and all that caused it. Other effects of its causes are
 --     omitted.
 -- grain: one row per vertex
--- like: main.flow_forward
--- param: start_kind, start_id, max_depth
+-- param: start_kind, start_id
+-- param: max_depth INTEGER = NULL  Maximum number of steps; NULL: no limit
 -- column: kind, id
 CREATE OR REPLACE MACRO main.flow_both(start_kind, start_id, max_depth := NULL) AS TABLE
 SELECT kind, id FROM main.flow_forward(start_kind, start_id, max_depth := max_depth)

@@ -3,24 +3,15 @@
 --     length. No subscription comes twice in a chain. What asks several of main.flow_path,
 --     main.end_to_end and main.end_to_end_trail keeps these rows in a table, and names it to them.
 -- grain: one row per run and chain
--- param: runs BIGINT[]  Runs to look at
--- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
---     commas; NULL: any
--- param: to_topic VARCHAR = NULL  Topics or nodes where flows end, in the same form; NULL: any
--- param: max_depth INTEGER = 32  Longest chain, in topics
--- param: max_paths INTEGER = 1000  Maximum number of paths, shortest first; also the limit on
---     chains of each length
--- column: run_id BIGINT  Run
+-- param: runs, from_topic, to_topic, max_depth, max_paths
+-- column: run_id
 -- column: path_id BIGINT  Number of the chain in this result
--- column: parent_path_id BIGINT  The chain without its last step; NULL: it has one step
--- column: depth BIGINT  Steps (topics) of the chain
--- column: publisher_id BIGINT  Last publisher; below 0: not traced
+-- column: parent_path_id, depth, publisher_id
 -- column: subscription_id BIGINT  Last subscription
 -- column: route BIGINT[]  How the flow came to the last publisher, as in routes of main.flow_path
 -- column: first_publisher_id BIGINT  First publisher; below 0: not traced
 -- column: first_route BIGINT[]  How the flow came to that one
--- column: is_cached BOOLEAN  The last step may wait in its node for other messages
--- column: is_path BOOLEAN  The chain is a path, not only the beginning of some
+-- column: is_cached, is_path
 -- column: is_cut BOOLEAN  The chain goes on, or has siblings, beyond the limits
 CREATE OR REPLACE MACRO main.flow_chain(
     runs, from_topic := NULL, to_topic := NULL, max_depth := 32, max_paths := 1000

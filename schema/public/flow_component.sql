@@ -1,8 +1,8 @@
 -- description: Everything that is connected with a publication, take, callback instance, request or
 --     response in any direction, and the thing itself.
 -- grain: one row per vertex
--- like: main.flow_forward
--- param: start_kind, start_id, max_depth
+-- param: start_kind, start_id
+-- param: max_depth INTEGER = NULL  Maximum number of steps; NULL: no limit
 -- column: kind, id
 CREATE OR REPLACE MACRO main.flow_component(start_kind, start_id, max_depth := NULL) AS TABLE
 SELECT kind, id

@@ -1,10 +1,10 @@
 -- description: All links in one shape, with the times of both ends: cause and effect of every step
 --     that a message takes.
 -- grain: one row per cause, effect and kind of link, however many annotations declare it
--- column: run_id BIGINT  Run that the row belongs to
+-- column: run_id
 -- column: from_kind VARCHAR  Cause: 'publication', 'take', 'callback_instance', 'request' or
 --     'response'
--- column: from_id BIGINT  Identity of the cause
+-- column: from_id
 -- column: to_kind VARCHAR  Effect: one of these
 -- column: to_id BIGINT  Identity of the effect
 -- column: link_kind VARCHAR  'transport', 'callback', 'service' (from a request to its response),

@@ -5,19 +5,21 @@
 --     it. Chains are cut at max_depth and max_paths; is_cut marks each chain that has more to it,
 --     or all of the run if it is not known which.
 -- grain: one row per run and chain
--- like: main.flow_chain
 -- param: runs, from_topic, to_topic, max_depth, max_paths
 -- param: only_paths BOOLEAN = false  Leave out chains that are not paths
--- param: chains VARCHAR = 'chain_here'  Name of a table with the rows of main.flow_chain for the
---     same arguments, where there is one
--- column: run_id, path_id, parent_path_id, depth
+-- param: chains
+-- column: run_id
+-- column: path_id BIGINT  Number of the chain in this result
+-- column: parent_path_id, depth
 -- column: publishers BIGINT[]  Publishers in order; below 0: not traced
--- column: subscriptions BIGINT[]  Subscriptions in order
--- column: topics VARCHAR[]  Topics in order
+-- column: subscriptions, topics
 -- column: routes BIGINT[][]  For each topic the calling node (negative: its process; 0: not known),
 --     then the services in order (0: not known); empty: no service led to it
 -- column: path VARCHAR  Nodes and topics in order, services in brackets, for people
--- column: publisher_id, subscription_id, is_cached, is_path, is_cut
+-- column: publisher_id
+-- column: subscription_id BIGINT  Last subscription
+-- column: is_cached, is_path
+-- column: is_cut BOOLEAN  The chain goes on, or has siblings, beyond the limits
 CREATE OR REPLACE MACRO main.flow_path(
     runs, from_topic := NULL, to_topic := NULL, max_depth := 32, max_paths := 1000,
     only_paths := false, chains := 'chain_here'

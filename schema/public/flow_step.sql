@@ -3,16 +3,14 @@
 --     limit cuts the flow, the vertices nearest to the start are kept.
 -- grain: one row per vertex of the flow and link that leads to it (one without link where nothing
 --     does), and one per subscription that did not get a message
--- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
--- param: start_id BIGINT  Identity of the vertex to start from
--- param: direction VARCHAR = 'both'  'forward' (effects), 'backward' (causes) or 'both'
+-- param: start_kind, start_id, direction
 -- param: max_depth INTEGER = 96  Maximum number of steps from the start; a message takes three
 -- param: max_vertices INTEGER = 1000  Maximum number of vertices
 -- param: internal BOOLEAN = false  Follow effects on ROS's own topics and services too
--- column: run_id BIGINT  Run that the row belongs to
+-- column: run_id
 -- column: depth INTEGER  Steps from the start; negative: backward
 -- column: from_kind VARCHAR  Cause that the link comes from, as kind
--- column: from_id BIGINT  Identity of the cause
+-- column: from_id
 -- column: link_kind VARCHAR  'transport', 'callback', 'service' or the kind of the causal link; to
 --     a subscription that did not take the message: its status there, as in main.stat_delivery
 -- column: wait_ns BIGINT [ns]  Time between cause and effect; NULL where the effect is part of the
@@ -21,17 +19,16 @@
 -- column: is_loss_affected BOOLEAN  A gap of the trace may hide a better partner
 -- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request', 'response', or
 --     'subscription' where the message was not taken
--- column: id BIGINT  Identity of the vertex
+-- column: id
 -- column: start_ns BIGINT [epoch ns]  Start of the publication or callback instance; the take; the
 --     sending of the request or response (the taking, if only that is known)
 -- column: end_ns BIGINT [epoch ns]  Its end; when the request or response was taken
 -- column: node VARCHAR  Node, or process in brackets; for requests and responses the client's node;
 --     ? if it is not known
--- column: label VARCHAR  What it is: a topic or service, or what triggers the callback
--- column: topic_name VARCHAR  Topic of the message
+-- column: label, topic_name
 -- column: symbol VARCHAR  Function of the callback
 -- column: thread VARCHAR  Name and id of the thread
--- column: host VARCHAR  Machine or container
+-- column: host
 -- column: missing VARCHAR  What the trace does not show: 'publication' that was taken, 'take' of
 --     the message, 'callback' it was taken for, 'sending' of the request or response, 'response' to
 --     the request, 'end' of the callback instance; 'copy': nothing, it is the middleware's copy of

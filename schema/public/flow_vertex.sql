@@ -1,18 +1,22 @@
 -- description: What vertices of the graph of flows are: when and where each was, what it is called,
 --     and what the trace does not show of it.
 -- grain: one row per vertex
--- like: main.flow_step
 -- param: vertices VARCHAR  Name of a table, or a part of the query, with the key, kind, id and
 --     depth of each
 -- column: key BIGINT  Its key
--- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
+-- column: kind
 -- column: id BIGINT  Its identity
 -- column: depth INTEGER  Its depth
--- column: run_id BIGINT  Run that it belongs to
--- column: start_ns, end_ns
--- column: thread_id BIGINT  Its thread
+-- column: run_id
+-- column: start_ns BIGINT [epoch ns]  Start of the publication or callback instance; the take; the
+--     sending of the request or response (the taking, if only that is known)
+-- column: end_ns BIGINT [epoch ns]  Its end; when the request or response was taken
+-- column: thread_id
 -- column: process_id BIGINT  Its process
--- column: node, label, topic_name, symbol
+-- column: node VARCHAR  Node, or process in brackets; for requests and responses the client's node;
+--     ? if it is not known
+-- column: label, topic_name
+-- column: symbol VARCHAR  Function of the callback
 -- column: missing VARCHAR  What the trace does not show here, as in main.flow_step
 -- column: reason VARCHAR  Why it is missing, as far as known
 CREATE OR REPLACE MACRO main.flow_vertex(vertices) AS TABLE

@@ -4,12 +4,11 @@
 --     table, or a part of the query
 -- column: group_id BIGINT  Group of the samples
 -- column: stack_frame_id BIGINT  Function
--- column: self_samples BIGINT  Samples in which it ran
--- column: samples BIGINT  Samples in which it ran, or what it called
+-- column: self_samples, samples
 -- column: self_ns BIGINT [ns]  CPU time of these; NULL: perf counted cycles
 -- column: total_ns BIGINT [ns]  CPU time of those
 -- column: self_share DOUBLE [share]  Part of the samples of the group in which it ran
--- column: total_share DOUBLE [share]  Part in which it ran, or what it called
+-- column: total_share
 CREATE OR REPLACE MACRO main.function_time(of_samples) AS TABLE
 WITH seen AS MATERIALIZED (
     SELECT group_id, stack_id, count(*) AS samples, sum(cpu_ns)::BIGINT AS cpu_ns

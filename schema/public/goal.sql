@@ -4,9 +4,9 @@
 --     of the answer, or if no other goal of that client was open that may have been accepted;
 --     feedback and requests to cancel if the server was concerned with no other goal at that time.
 -- grain: one row per goal and action server that took it; one per goal that none took
--- column: run_id BIGINT  Run that the row belongs to
+-- column: run_id
 -- column: goal_id BIGINT  Identity of the goal: that of the request that sent it
--- column: action_name VARCHAR  Name of the action
+-- column: action_name
 -- column: action_client_id BIGINT  Action client that sent it; NULL: not traced
 -- column: action_server_id BIGINT  Action server that took it; NULL: none was seen to
 -- column: sent_ns BIGINT [epoch ns]  The client sent it

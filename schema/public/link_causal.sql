@@ -1,15 +1,9 @@
 -- description: What caused each publication.
 -- grain: one row per publication, and callback instance, or take without one, that caused it
--- column: run_id
--- column: callback_instance_id
--- column: take_id
--- column: publication_id
--- column: kind
--- column: annotation_id
+-- column: run_id, callback_instance_id, take_id, publication_id, kind, annotation_id
 -- column: wait_ns BIGINT [ns]  From the end of the callback, or the take, to the publication; 0 for
 --     direct links
--- column: candidate_count
--- column: is_loss_affected
+-- column: candidate_count, is_loss_affected
 -- column: is_followed BOOLEAN  Flows and paths follow it
 SELECT
     l.run_id, l.callback_instance_id, l.take_id, l.publication_id, l.kind, l.annotation_id,

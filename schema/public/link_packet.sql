@@ -1,19 +1,10 @@
 -- description: Network packets that kernel traces recorded at both ends, between hosts of two
 --     clocks. A negative latency means that the clocks are apart.
 -- grain: one row per network packet and clock that received it from another
--- column: run_id
--- column: sent_trace_id
--- column: received_trace_id
--- column: sent_ns
--- column: received_ns
+-- column: run_id, sent_trace_id, received_trace_id, sent_ns, received_ns
 -- column: latency_ns BIGINT [ns]  From sent_ns to received_ns
--- column: protocol
--- column: source_address
--- column: source_port
--- column: destination_address
--- column: destination_port
--- column: identification
--- column: sequence_number
+-- column: protocol, source_address, source_port, destination_address, destination_port,
+--     identification, sequence_number
 WITH trace_clock AS (
     SELECT t.trace_id, c.offset_ns, c.drift_ppb, c.reference_ns
     FROM store.trace AS t

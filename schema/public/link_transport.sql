@@ -1,14 +1,8 @@
 -- description: Messages from publication to take. A negative latency means that the clocks of two
 --     hosts are apart.
 -- grain: one row per take whose publication is known
--- column: run_id
--- column: publication_id
--- column: take_id
--- column: method
--- column: candidate_count
--- column: is_self_loop
--- column: is_loss_affected
--- column: is_copy
+-- column: run_id, publication_id, take_id, method, candidate_count, is_self_loop, is_loss_affected,
+--     is_copy
 -- column: latency_ns BIGINT [ns]  From the end of the publication to the take; NULL: the message
 --     was stored
 -- column: stored_ns BIGINT [ns]  How long it was stored: from the end of the publication until its

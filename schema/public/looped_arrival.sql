@@ -2,10 +2,10 @@
 --     subscription twice, but that descend from an arrival there through a loop. Any loop through a
 --     subscription consists of subscriptions that it leads to and that lead back to it.
 -- grain: one row per path and take
--- param: runs BIGINT[]  Runs to look at
+-- param: runs
 -- param: arrivals BIGINT[][]  Arrivals of main.end_to_end: each pair of path_id and take_id once
 -- column: path_id BIGINT  Path, as main.end_to_end numbers it
--- column: take_id BIGINT  Take at the end of the path
+-- column: take_id
 CREATE OR REPLACE MACRO main.looped_arrival(runs, arrivals) AS TABLE
 WITH RECURSIVE arrival AS MATERIALIZED (
     SELECT arrival[1] AS path_id, arrival[2] AS take_id

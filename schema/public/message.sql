@@ -4,7 +4,7 @@
 --     publication.
 -- grain: one row per publication and take of it; one per publication or take without the other
 -- column: take_id BIGINT  Take; NULL: no subscription took the message
--- column: run_id BIGINT  Run that the row belongs to
+-- column: run_id
 -- column: topic_name VARCHAR  Topic; NULL: not known
 -- column: publisher VARCHAR  Node that published, or its process in brackets; NULL: not known
 -- column: subscriber VARCHAR  Node that took it, or its process in brackets; NULL: none

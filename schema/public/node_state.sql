@@ -3,12 +3,11 @@
 --     last event of the process. A state is left out where the next change leaves another one. A
 --     node that never changed its state has none.
 -- grain: one row per stretch of a node in one state
--- column: run_id BIGINT  Run that the row belongs to
+-- column: run_id
 -- column: node_id BIGINT  Node
 -- column: state VARCHAR  State as the node calls it: 'unconfigured', 'inactive', 'active',
 --     'finalized', or between two of them 'configuring', 'activating' and so on
--- column: start_ns BIGINT [epoch ns]  Begin
--- column: end_ns BIGINT [epoch ns]  End
+-- column: start_ns, end_ns
 SELECT
     s.run_id, s.node_id, s.state,
     derive.corrected_ns(s.start_ns, p) AS start_ns,

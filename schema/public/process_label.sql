@@ -1,7 +1,7 @@
 -- description: What people call a process: its nodes. The name of a process alone tells little:
 --     that of each node of rclpy is python3, that of each container of components component_conta.
 -- grain: one row per process
--- column: run_id BIGINT        Run that the row belongs to
+-- column: run_id
 -- column: process_id BIGINT    The process
 -- column: nodes VARCHAR        Full names of its first two nodes, and how many more it has; without
 --     nodes its name and id, in brackets

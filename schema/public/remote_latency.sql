@@ -1,7 +1,7 @@
 -- description: Messages between hosts of different clocks: how long they took, and how wrong that
 --     can be. The bound contains the errors of both clocks.
 -- grain: one row per message between two clocks
--- column: run_id BIGINT  Run that the row belongs to
+-- column: run_id
 -- column: publication_id BIGINT  Where the message came from
 -- column: take_id BIGINT  Where it was received
 -- column: from_host_id BIGINT  Host that sent

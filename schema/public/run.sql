@@ -1,14 +1,11 @@
 -- description: Recordings: the traces that one ingest read. Nothing is ever linked across runs.
 -- grain: one row per ingest of traces that belong together
--- column: run_id
--- column: name
+-- column: run_id, name
 -- column: created_at VARCHAR  When the run was ingested: ISO 8601, UTC
--- column: msgflow_version
--- column: derivation_hash
+-- column: msgflow_version, derivation_hash
 -- column: start_ns BIGINT [epoch ns]  First event of any trace but kernel traces
 -- column: end_ns BIGINT [epoch ns]  Last event of any trace but kernel traces
--- column: event_count
--- column: labels
+-- column: event_count, labels
 WITH extent AS (
     SELECT
         t.run_id,

@@ -5,11 +5,10 @@
 -- grain: one row per piece of an interval
 -- param: intervals VARCHAR  Name of rows of interval_id, thread_id, from_ns, to_ns: a table, or a
 --     part of the query
--- param: runs BIGINT[]  Runs that they are of
+-- param: runs
 -- param: max_wakers INTEGER = 32  Longest chain of wakers
 -- column: interval_id BIGINT  The interval
--- column: from_ns BIGINT [epoch ns]  Begin
--- column: to_ns BIGINT [epoch ns]  End
+-- column: from_ns, to_ns
 -- column: wakers BIGINT  How many wakers lead to the thread: 0 for that of the interval
 -- column: thread_id BIGINT  The thread that did it
 -- column: state VARCHAR  Its state, as in main.thread_state; 'unknown' also where the trace does
@@ -17,9 +16,7 @@
 -- column: priority INTEGER  Its priority, as the kernel has it
 -- column: by_kind VARCHAR  What took the CPU, or ended the sleep: 'thread', or 'timer', 'interrupt'
 --     or 'softirq'. NULL: not known, or the state needs none
--- column: by_thread_id BIGINT  That thread, of a ROS process
--- column: by_other_thread_id BIGINT  That thread, of another process
--- column: by_priority INTEGER  Its priority; known for what took the CPU
+-- column: by_thread_id, by_other_thread_id, by_priority
 -- column: is_loss_affected BOOLEAN  Kernel events were lost meanwhile
 CREATE OR REPLACE MACRO main.schedule_piece(intervals, runs, max_wakers := 32) AS TABLE
 WITH RECURSIVE state AS MATERIALIZED (

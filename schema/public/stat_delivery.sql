@@ -3,8 +3,7 @@
 --     do not show in a trace. Of a ring buffer whose subscription was not traced, only what was
 --     taken is listed. The middleware's copy of a message in a ring buffer is not a delivery.
 -- grain: one row per publication and subscription of its topic
--- column: run_id BIGINT  Run that the row belongs to
--- column: publication_id BIGINT  The message
+-- column: run_id, publication_id
 -- column: publisher_id BIGINT  Its publisher
 -- column: subscription_id BIGINT  Subscription that should have taken it
 -- column: take_id BIGINT  Take of the message; NULL: it was not taken, or that is not known

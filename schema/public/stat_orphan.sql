@@ -1,7 +1,7 @@
 -- description: Takes whose publication is not known, and why.
 -- grain: one row per take without a publication
--- column: run_id BIGINT  Run that the row belongs to
--- column: take_id BIGINT  The take
+-- column: run_id
+-- column: take_id BIGINT  Identity of the take
 -- column: subscription_id BIGINT  Subscription that took it
 -- column: reason VARCHAR  'no_stamp', 'receiver_gap' (the event with the stamp was lost),
 --     'clock_set' (the clock that stamps messages was set about then), 'before_tracing',

@@ -1,8 +1,7 @@
 -- description: What people call a thread: the nodes of its process, and its own name where it
 --     differs from that of the process, as for threads of the middleware.
 -- grain: one row per thread
--- column: run_id BIGINT     Run that the row belongs to
--- column: thread_id BIGINT  The thread
+-- column: run_id, thread_id
 -- column: label VARCHAR     Nodes of its process (main.process_label), and its name; without nodes
 --     its name
 SELECT

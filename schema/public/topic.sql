@@ -1,15 +1,12 @@
 -- description: Topics, by name: who publishes and subscribes, and how many messages there were.
 --     Publishers and subscriptions without a known topic are one row of a run.
 -- grain: one row per run and topic
--- column: run_id BIGINT  Run
+-- column: run_id
 -- column: topic_name VARCHAR  Name of the topic; NULL: not known
--- column: is_internal BOOLEAN  ROS uses the topic for itself
+-- column: is_internal
 -- column: publishers VARCHAR[]  Nodes that publish on it, or their processes in brackets
 -- column: subscribers VARCHAR[]  Nodes that subscribe to it, likewise
--- column: publisher_count BIGINT  Publishers
--- column: subscription_count BIGINT  Subscriptions
--- column: publication_count BIGINT  Messages published
--- column: take_count BIGINT  Messages handed over to a subscription
+-- column: publisher_count, subscription_count, publication_count, take_count
 WITH published AS (
     SELECT publisher_id, count(*) AS number FROM store.publication GROUP BY publisher_id
 ),

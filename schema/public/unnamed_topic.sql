@@ -3,7 +3,7 @@
 --     of the file: a publisher, where there is one.
 -- grain: one row per unnamed topic
 -- param: only_run BIGINT  Run to look at
--- column: run_id BIGINT  Run
+-- column: run_id
 -- column: message_count BIGINT  Messages published, or taken where no publisher is known
 -- column: publishers VARCHAR  Nodes that publish, or their processes in brackets; NULL: not known
 -- column: subscribers VARCHAR  Nodes that take the messages, likewise

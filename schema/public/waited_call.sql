@@ -1,12 +1,12 @@
 -- description: Calls of services that a callback waited for: it sent the request, and took the
 --     response before it ended. Between them it did nothing but wait, as far as the trace shows.
 -- grain: one row per such call
--- column: run_id BIGINT  Run
+-- column: run_id
 -- column: request_id BIGINT  The request
 -- column: callback_instance_id BIGINT  Callback instance that waited
 -- column: service_id BIGINT  The service; NULL: not in the trace
 -- column: service_name VARCHAR  Its name
--- column: server VARCHAR  Node that offers it, or process in brackets; NULL: not in the trace
+-- column: server
 -- column: server_instance_id BIGINT  Callback instance of the service; NULL: not traced
 -- column: sent_ns BIGINT [epoch ns]  The request is sent
 -- column: taken_ns BIGINT [epoch ns]  It is taken

@@ -5,8 +5,11 @@ from pathlib import Path
 import pytest
 from header_rules import faults
 
+from msgflow.db.objects import completed
+from msgflow.db.store_table import store_tables
 from msgflow.files.resources import resource_directory
-from msgflow.sql.header import Column, Header, HeaderError, Param, parse
+from msgflow.query.catalogue import load_query
+from msgflow.sql.header import Column, Header, HeaderError, Param, parse, vocabulary
 
 PATH = Path("queries/example.sql")
 
@@ -32,10 +35,8 @@ FULL = """\
 -- when: main.a WHERE kind IN ('a', 'b'),
 --     main.b
 -- also: main.c, main.d
--- answer: median_ns
--- heading: start_ns, median_ns
--- brief: start_ns,
---     median_ns
+-- brief: start_ns (heading),
+--     median_ns (slowest), size (even 0), hidden (not 0)
 -- severity: warning
 SELECT 1
 -- a comment of the body
@@ -72,9 +73,10 @@ def test_everything_is_parsed() -> None:
     assert header.when == ("main.a", "main.b")
     assert header.also == ("main.c", "main.d")
     assert header.severity == "warning"
-    assert header.brief == ("start_ns", "median_ns")
-    assert header.answer == ("median_ns",)
-    assert header.heading == ("start_ns", "median_ns")
+    assert header.brief == ("start_ns", "median_ns", "size", "hidden")
+    assert header.answer == ("size",)
+    assert header.heading == ("start_ns",)
+    assert (header.slowest, header.zero) == ("median_ns", "hidden")
     assert header.body == "SELECT 1\n-- a comment of the body\n"
 
 
@@ -82,7 +84,7 @@ def test_an_object_needs_what_its_statements_name() -> None:
     header = parse_with(
         "-- when: staging.d, derive.f\n"
         "-- also: derive.g\n"
-        "-- unites: derive.h\n"
+        "-- reads: derive.h, made\n"
         "CREATE OR REPLACE TEMP TABLE step AS\nFROM store.c;\n\n"
         "WITH e AS (FROM main.b) -- not main.x\nSELECT derive.f(e.main, 'a.b') FROM e\n"
         "JOIN query_table('raw.a') USING (id)"
@@ -131,11 +133,11 @@ def test_a_macro_keeps_its_whole_statement() -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("--param: a BIGINT  x", "example.sql:3: expected '-- field: value'"),
-        ("-- param: a", "example.sql:3: expected '-- param: name TYPE"),
+        ("--param: a BIGINT  x", "example.sql: expected '-- field: value'"),
+        ("-- param: a BIGINT", "example.sql: expected '-- param: name TYPE"),
         ("-- param: a BIGINT = 1 one space", "expected '-- param: name TYPE"),
         ("-- param: a BIGINT = one  Default", "'one' is not NULL, TRUE, FALSE, a number"),
-        ("-- column: a-b", "example.sql:3: expected '-- column: name TYPE [unit]"),
+        ("-- column: a-b", "example.sql: expected '-- column: name TYPE [unit]"),
     ],
 )
 def test_a_bad_line_is_named(line: str, message: str) -> None:
@@ -144,31 +146,54 @@ def test_a_bad_line_is_named(line: str, message: str) -> None:
     assert message in str(raised.value)
 
 
-def test_names_alone_are_declared_by_the_first_file_that_has_them(tmp_path: Path) -> None:
-    head = "-- description: x\n"
-    for name in ("a", "b"):
-        text = f"{head}-- param: depth BIGINT = 1  Of {name}\n-- column: {name} BIGINT  Of {name}\n"
-        (tmp_path / f"{name}.sql").write_text(f"{text}SELECT 1\n")
-    text = f"{head}-- like: b, a\n-- param: depth\n-- column: a, b,\n--     c\nSELECT 1\n"
-    with pytest.raises(HeaderError, match="nothing declares this column — c"):
-        parse(text, tmp_path / "x.sql")
-    (place := tmp_path / "public").mkdir()
-    for name in ("a", "b"):
-        (tmp_path / f"{name}.sql").rename(place / f"{name}.sql")
-    header = parse(text, place / "x.sql")
-    assert header.params == (Param("depth", "BIGINT", 1, True, "Of b"),)
-    assert [column.description for column in header.columns] == ["Of a", "Of b", ""]
+def test_a_name_alone_is_that_of_the_vocabulary() -> None:
+    header = parse_with("-- param: max_depth,\n--     from\n-- column: run_id, path_id")
+    known = {each.name: each for each in (*vocabulary().params, *vocabulary().columns)}
+    assert [*header.params, *header.columns] == [
+        known[name] for name in ("max_depth", "from", "run_id", "path_id")
+    ]
+    for key in ("param", "column"):
+        with pytest.raises(HeaderError, match=f"nothing declares this {key} — moon"):
+            parse_with(f"-- {key}: moon")
+
+
+def test_a_variant_means_what_its_query_means() -> None:
+    for path in ("queries/links-suggested.sql", "msgflow/fleet/sql/links.sql"):
+        folder = resource_directory("queries").parent
+        header = parse("-- description: x\n-- column: kind, run_id\nSELECT 1\n", folder / path)
+        of_links = {column.name: column for column in load_query("links").columns}
+        assert header.columns == (of_links["kind"], of_links["run_id"])
+        assert "periodic_async" in header.columns[0].description
+
+
+def test_the_table_declares_the_columns_of_a_public_view() -> None:
+    text = "-- description: x\n-- column: run_id, path_id\nSELECT 1\n"
+    header = parse(text, resource_directory("schema") / "public" / "callback.sql")
+    assert header.columns == (Column("run_id", "", None, ""), Column("path_id", "", None, ""))
+    (run_id, path_id) = completed(header).columns
+    assert run_id == store_tables()["callback"].columns["run_id"]
+    assert path_id.description.startswith("Path, as main.flow_path")
 
 
 def test_steps_of_another_file_come_first(tmp_path: Path) -> None:
-    head, step = "-- description: x\n", "CREATE OR REPLACE TEMP TABLE {} AS\nSELECT 1;\n\n"
-    made = "".join(map(step.format, ("first", "other")))
+    head, step = "-- description: x\n", "CREATE OR REPLACE TEMP TABLE {} AS\nFROM {};\n\n"
+    made = "".join(
+        step.format(*names) for names in (("first", "a"), ("other", "b"), ("c", "first"))
+    )
     (tmp_path / "a.sql").write_text(f"{head}{made}SELECT 1\n")
-    text = f"{head}-- like: a\n-- steps: first\n{step.format('own')}SELECT 1\n"
+    text = f"{head}-- reads: c, of_program\n{step.format('own', 'c')}SELECT 1\n"
+    (tmp_path / "x.sql").write_text(text)
     header = parse(text, tmp_path / "x.sql")
-    assert [made.table for made in header.steps] == ["first", "own"]
-    with pytest.raises(HeaderError, match="nothing makes this table — last"):
-        parse(text.replace("steps: first", "steps: last"), tmp_path / "x.sql")
+    assert [made.table for made in header.steps] == ["first", "c", "own"]
+    assert header.reads == ("c", "of_program")
+
+
+def test_the_next_command_is_the_first_whose_columns_have_values() -> None:
+    header = parse_with("-- next: query waits --node {node} | flow --take '{id} x' | check")
+    assert header.next_command({"node": "/a b", "id": 1}) == ("query", "waits", "--node", "/a b")
+    assert header.next_command({"node": None, "id": 1}) == ("flow", "--take", "1 x")
+    assert header.next_command({}) == ("check",)
+    assert parse_with("-- grain: one row").next_command({}) is None
 
 
 @pytest.mark.parametrize(
@@ -176,7 +201,7 @@ def test_steps_of_another_file_come_first(tmp_path: Path) -> None:
     [
         ("SELECT 1\n", "there is no header"),
         ("", "there is no header"),
-        ("--     first\nSELECT 1\n", "starts with a continuation"),
+        ("--     first\nSELECT 1\n", "expected '-- field: value'"),
     ],
 )
 def test_an_incomplete_file_is_refused(text: str, message: str) -> None:
@@ -198,9 +223,10 @@ def test_an_incomplete_file_is_refused(text: str, message: str) -> None:
         ("-- note: moon", "note 'moon' is not one of callbacks"),
         ("-- param: a BIGINT  x\n-- param: a BIGINT  y", "'a' stands twice"),
         ("-- column: a BIGINT  x\n-- column: a BIGINT  y", "'a' stands twice"),
-        *(
-            (f"-- column: b BIGINT  x\n-- {key}: a", f"{key} names a column that there is not: 'a'")
-            for key in ("brief", "answer", "heading", "slowest", "zero")
+        ("-- column: b BIGINT  x\n-- brief: a", "brief names a column that there is not: 'a'"),
+        (
+            "-- column: b BIGINT  x\n-- brief: b (heading), b (0)",
+            "brief has a mark that there is not: 'b (0)'",
         ),
     ],
 )

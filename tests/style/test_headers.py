@@ -19,10 +19,10 @@ from msgflow.cli.operation import OWN
 from msgflow.cli.query_command import build_command
 from msgflow.database import Database
 from msgflow.db import objects
-from msgflow.query.catalogue import load_query
+from msgflow.query.catalogue import load_query, query_names
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
-from msgflow.sql.header import SCHEMAS, Header, read
-from msgflow.sql.statement import RECORDED, internal_sql
+from msgflow.sql.header import SCHEMAS, Column, Header, Param, read, vocabulary
+from msgflow.sql.statement import RECORDED, Statements, internal_sql
 from msgflow.view.page_query import DIRECTORY, page_query
 
 FILES = sql_files()
@@ -248,6 +248,91 @@ def test_columns_of_a_view_are_those_of_its_output(
     output = described(connection.sql(f"FROM {file.header.name}"))
     if file.layer == "public" or file.header.columns:
         assert output == declared(file)
+
+
+@each(
+    [
+        (statements, name)
+        for statements in (internal_sql(), Statements(DIRECTORY))
+        for name in statements.names()
+    ],
+    name=lambda pair: pair[1],
+)
+def test_a_statement_says_which_tables_are_made_for_it(pair: tuple[Statements, str]) -> None:
+    statements, name = pair
+    header = statements.header(name)
+    own = re.findall(
+        r"(\w+)(?: ?\([^()]*\))?(?: USING KEY \(\w+\))? AS (?:NOT )?(?:MATERIALIZED )?\(",
+        header.body,
+    )
+    inline = {each for each in statements.names() if statements.header(each).kind == "inline"}
+    assert set(header.reads) == header.relations - inline - set(own)
+
+
+def test_a_query_says_which_steps_of_others_it_reads() -> None:
+    made = {
+        table: file.path
+        for file in QUERIES
+        for table in re.findall(r"TEMP TABLE (\w+) AS\n", file.path.read_text(encoding="utf-8"))
+    }
+    for file in QUERIES:
+        own = [step.sql for step in file.header.steps if made[step.table] == file.path]
+        words = set(re.findall(r"[a-z_]+", "".join([*own, file.header.body])))
+        others = {table for table, path in made.items() if path != file.path}
+        assert set(file.header.reads) == words & others, file
+    tables = [step.table for file in QUERIES for step in file.header.steps]
+    assert made.keys() == set(tables)
+
+
+def terms(header: Header) -> Iterator[tuple[str, str]]:
+    """Yield kind and name of what a header takes from the vocabulary."""
+    for kind, ours, theirs in (
+        ("param", header.params, vocabulary().params),
+        ("column", header.columns, vocabulary().columns),
+    ):
+        # One of the same words that stands in the file itself is another object.
+        yield from ((kind, each.name) for each in theirs if any(each is own for own in ours))
+
+
+def family(header: Header) -> str:
+    """Return the query of which a file is a variant, or which it asks of a lake; else its path."""
+    name = header.path.stem.replace("_", "-")
+    queries = (query for query in query_names() if f"{name}-".startswith(f"{query}-"))
+    return next(queries, str(header.path))
+
+
+def test_a_term_of_the_vocabulary_returns() -> None:
+    """What one statement alone means, with its variants, stands in its header."""
+    users: dict[tuple[str, str], set[str]] = {}
+    for header in (*(file.header for file in FILES), *OF_PACKAGE):
+        for term in terms(header):
+            users.setdefault(term, set()).add(family(header))
+    declared = {("param", each.name) for each in vocabulary().params}
+    declared |= {("column", each.name) for each in vocabulary().columns}
+    assert {term for term in declared if len(users.get(term, ())) < 2} == set()
+
+
+@each(
+    [
+        header
+        for header in (*(file.header for file in FILES), *OF_PACKAGE)
+        if family(header) in (header.name, str(header.path))
+    ],
+    name=lambda header: str(header.path),
+)
+def test_what_the_vocabulary_means_does_not_stand_in_a_file_again(header: Header) -> None:
+    taken = {name for _, name in terms(header)}
+    known = {each.name: each for each in (*vocabulary().params, *vocabulary().columns)}
+    for declared in (*header.params, *header.columns):
+        if declared.name not in taken and type(declared) in (Param, Column):
+            assert declared != known.get(declared.name), declared.name
+
+
+def test_the_vocabulary_is_in_order() -> None:
+    for items in (vocabulary().params, vocabulary().columns):
+        names = [each.name for each in items]
+        assert names == sorted(set(names))
+    assert {each.type for each in vocabulary().columns if each.name.endswith("_ns")} == {"BIGINT"}
 
 
 @each([*(file.header for file in FILES), *OF_PACKAGE], name=lambda header: str(header.path))

@@ -13,11 +13,13 @@ from msgflow.sql.value import is_integer
 REPEATABLE = {"param", "column", "variant"}
 SINGLE = {
     "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when", "also",
-    "unites", "brief", "answer", "heading", "slowest", "zero", "like", "steps",
+    "reads", "next", "brief",
 }  # fmt: skip
 NOTES = {"clocks", "callbacks", "kernel", "requests", "goals", "samples"}
 # Begins of lines above the SQL.
 _HEAD = re.compile(r"(?:--[^\n]*(?:\n|$))*")
+_BRIEF = re.compile(r"^-- brief: +((?:.*\n--     )*.*)$", re.MULTILINE)
+_MARKED = re.compile(r"\w+(?: \((?:heading|slowest|even 0|not 0)\))?")
 _KEY = re.compile(r"^-- ([a-z_]+):", re.MULTILINE)
 
 
@@ -41,12 +43,13 @@ def faults(text: str, header: Header) -> Iterator[str]:
     columns = [column.name for column in header.columns]
     for names in ([param.name for param in header.params], columns):
         yield from (f"{name!r} stands twice" for name, count in Counter(names).items() if count > 1)
-    named = {key: getattr(header, key) for key in ("brief", "answer", "heading")}
-    named |= {key: filter(None, [getattr(header, key)]) for key in ("slowest", "zero")}
-    for key, names in named.items():
-        for name in names:
-            if name not in columns:
-                yield f"{key} names a column that there is not: {name!r}"
+    for name in header.brief:
+        if name not in columns:
+            yield f"brief names a column that there is not: {name!r}"
+    for names in _BRIEF.findall(text):
+        for name in re.split(r",\s+(?:--     )?", names):
+            if not _MARKED.fullmatch(name):
+                yield f"brief has a mark that there is not: {name!r}"
     yield from chain.from_iterable(map(_of_param, (*header.params, *header.variants)))
 
 

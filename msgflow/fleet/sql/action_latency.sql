@@ -2,7 +2,6 @@
 -- description: As the query action-latency says it of one run. Quantiles of runs cannot be added
 --     up: the largest of any run stands for them.
 -- grain: one row per action server, client and group of runs
--- like: queries.action-latency, service_latency
 -- column: label_group, action_name, server, client, runs
 -- column: goals BIGINT               Goals sent or taken
 -- column: accepted, rejected, not_answered, asked, finished, cancelled, doubtful

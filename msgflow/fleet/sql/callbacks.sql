@@ -2,7 +2,6 @@
 -- description: As the query callbacks says it of one run. Quantiles of several callbacks
 --     are off by less than 1 %, all else is exact.
 -- grain: one row per node, callback and group of runs
--- like: queries.callbacks, waits
 -- column: label_group, node, callback, runs
 -- column: count BIGINT              Callback instances
 -- column: open, period_min_ns, period_median_ns, period_max_ns, min_ns, median_ns, mean_ns, p95_ns,

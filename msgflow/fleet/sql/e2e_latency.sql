@@ -2,15 +2,13 @@
 -- description: As the query e2e-latency says it of one run, exactly: computed from the flows of all
 --     runs. Paths of one text are one path.
 -- grain: one row per path and group of runs
--- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
---     count: the first or last arrival of each root, the newest root of each arrival, or all
--- like: queries.e2e-latency
--- column: label_group BIGINT       Group of runs
+-- param: case
+-- column: label_group
 -- column: runs BIGINT              Runs that have the path
 -- column: roots BIGINT             Flows that began
 -- column: reached, superseded, dropped, lost, no_output, not_connected, unknown, cut_by_recording,
---     loss_affected, ambiguous, pairs, stored, looped
--- column: min_ns, median_ns, mean_ns, p95_ns, p99_ns, max_ns
+--     loss_affected, ambiguous, pairs, stored, looped, min_ns, median_ns, mean_ns, p95_ns, p99_ns,
+--     max_ns
 -- column: sink_event VARCHAR       Events that stopped the clock
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond the limits of the query
 -- column: reasons, path

@@ -2,7 +2,6 @@
 -- description: As the query executor-usage says it of one run; threads of one process and kind of
 --     executor are put together. The callback share is the share of all their time.
 -- grain: one row per host, process, kind of executor and group of runs
--- like: queries.executor-usage, service_latency
 -- column: label_group, host, process, executor_kind, runs
 -- column: threads BIGINT            Threads of all these runs
 -- column: seen_ns BIGINT [ns]       Time for which threads were seen

@@ -2,19 +2,18 @@
 -- description: Findings of the query info --section findings over many runs, with cause and cure.
 --     Each names the run that has most of it.
 -- grain: one row per kind of finding and group of runs
--- column: label_group BIGINT  Group of runs
+-- column: label_group
 -- column: severity VARCHAR    'error' where results are wrong or missing, 'warning' where they may
 --     be, or 'info'
 -- column: name VARCHAR        Name of the finding
--- column: title VARCHAR       What was found
+-- column: title
 -- column: runs BIGINT         Runs in which it was
 -- column: places BIGINT       Traces, processes, topics where it was
 -- column: count BIGINT        How often, in all
 -- column: worst_run VARCHAR   Run with most of it
 -- column: subject VARCHAR     There: where
 -- column: detail VARCHAR      There: numbers, and what they mean
--- column: cause VARCHAR       Where it comes from, as a rule
--- column: cure VARCHAR        What to do about it
+-- column: cause, cure
 -- brief: severity, title, runs, count, worst_run, subject, places, cure
 SELECT
     g.label_group, f.severity, f.name,

@@ -2,15 +2,12 @@
 -- description: What msgflow info --section quality says of each run, added up over all its traces
 --     and over all its processes, and over the runs. Each topic has a row.
 -- grain: one row per scope, topic, measure and group of runs
--- like: queries.info-quality
--- column: label_group BIGINT     Group of runs
--- column: scope
+-- column: label_group, scope
 -- column: topic VARCHAR [topic]  Topic; empty: not of one
 -- column: measure
 -- column: runs BIGINT            Runs in which something is affected
 -- column: affected, total, affected_percent, is_internal
--- brief: scope, topic, measure, runs, affected, total, affected_percent
--- answer: affected
+-- brief: scope, topic, measure, runs, affected (even 0), total, affected_percent
 SELECT
     g.label_group, q.scope,
     CASE WHEN q.scope = 'topic' THEN q.subject END AS topic,

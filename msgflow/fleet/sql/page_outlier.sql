@@ -3,8 +3,7 @@
 --     (the median of the distances, scaled to a standard deviation) and than a twentieth of it.
 --     Paths with fewer than five runs have no row: what is usual is not known.
 -- grain: one row per path and run that stands out
--- column: path VARCHAR [path]        Nodes and topics
--- column: run VARCHAR                Key of the run
+-- column: path, run
 -- column: median_ns BIGINT [ns]      Median latency of the run
 -- column: usual_ns BIGINT [ns]       Median of the medians of all runs
 -- column: change_percent DOUBLE [%]  Difference of the two

@@ -3,8 +3,10 @@
 -- description: Quantiles of the first arrivals of each run, and how many flows began, arrived,
 --     and were dropped or lost.
 -- grain: one row per path and run
--- like: queries.e2e-latency, page_worst
--- column: path, run, median_ns, p99_ns, max_ns
+-- column: path, run
+-- column: median_ns BIGINT [ns]  Median latency
+-- column: p99_ns
+-- column: max_ns BIGINT [ns]  Longest latency
 -- column: roots BIGINT            Flows that began
 -- column: reached BIGINT          Flows that reached the end of the path
 -- column: dropped BIGINT          Flows that ended in a full queue

@@ -1,13 +1,11 @@
 -- title: Runs, as the page of a lake needs them
 -- description: The chosen runs in the order of their time.
 -- grain: one row per run
--- column: run VARCHAR         Key of the run
--- column: name VARCHAR        Name of the run
+-- column: run, name
 -- column: began VARCHAR       Start of the run, UTC
 -- column: start_s DOUBLE      The same in seconds since the epoch
 -- column: labels VARCHAR[]    Labels, KEY=VALUE
--- column: event_count BIGINT  Events read
--- column: source VARCHAR      What it was read from
+-- column: event_count, source
 -- column: has_database BOOLEAN  The lake has its database
 SELECT
     run, name,

@@ -2,7 +2,6 @@
 -- description: As the query service-latency says it of one run. Quantiles of runs cannot be added
 --     up: the largest of any run stands for them.
 -- grain: one row per service, client and group of runs
--- like: queries.service-latency, topics_delivery
 -- column: label_group, service_name, server, client, runs
 -- column: requests BIGINT             Requests sent or taken
 -- column: answered, not_taken, not_answered, not_received, negative, round_trip_min_ns

@@ -2,7 +2,6 @@
 -- description: As the query timers says it of one run. Quantiles of runs cannot be added up: the
 --     largest of any timer stands for them.
 -- grain: one row per node, timer and group of runs
--- like: queries.timers, waits
 -- column: label_group, node, callback, runs
 -- column: count BIGINT              Calls
 -- column: missed, bunched

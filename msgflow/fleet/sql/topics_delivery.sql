@@ -2,7 +2,6 @@
 -- description: As the query topics --measure delivery says it of one run. Counts are added, and the
 --     shares are of their sums.
 -- grain: one row per topic, receiving node and group of runs
--- like: queries.topics-delivery, topics_latency
 -- column: label_group, topic_name, subscriber, runs
 -- column: lossy_runs BIGINT         Of these, runs in which messages were dropped or lost
 -- column: published BIGINT          Messages published on the topic
@@ -11,10 +10,9 @@
 -- column: cut_by_recording, unknown, delivered_percent, lost_percent
 -- column: orphans BIGINT            Takes whose publication is not known
 -- column: reasons, orphan_reasons, is_internal
--- brief: topic_name, subscriber, delivered, dropped, lost, delivered_percent, runs, lossy_runs,
---     unknown, lost_percent, published, reasons, not_connected, cut_by_recording, orphans,
---     orphan_reasons
--- answer: delivered, dropped, lost, unknown
+-- brief: topic_name, subscriber, delivered (even 0), dropped (even 0), lost (even 0),
+--     delivered_percent, runs, lossy_runs, unknown (even 0), lost_percent, published, reasons,
+--     not_connected, cut_by_recording, orphans, orphan_reasons
 WITH merged AS (
     SELECT
         g.label_group, d.topic_name, d.subscriber,

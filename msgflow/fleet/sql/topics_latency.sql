@@ -2,13 +2,10 @@
 -- description: As the query topics --measure latency says it of one run. Quantiles of several
 --     subscriptions are off by less than 1 %, means by less than 1 ns, all else is exact.
 -- grain: one row per topic, receiving node and group of runs
--- like: e2e_latency, queries.topics-latency
--- column: label_group, topic_name, subscriber
--- column: runs BIGINT               Runs that have it
+-- column: label_group, topic_name, subscriber, runs
 -- column: takes BIGINT              Messages received
--- column: linked
--- column: ambiguous BIGINT          Links with more than one candidate
--- column: negative, min_ns, median_ns, mean_ns, p95_ns, p99_ns, max_ns, is_internal
+-- column: linked, ambiguous, negative, min_ns, median_ns, mean_ns, p95_ns, p99_ns, max_ns,
+--     is_internal
 -- brief: topic_name, subscriber, median_ns, p95_ns, max_ns, runs, takes, linked, negative,
 --     ambiguous, mean_ns, p99_ns, min_ns
 WITH merged AS (

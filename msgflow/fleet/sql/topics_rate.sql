@@ -3,7 +3,6 @@
 --     together, without the time between them. Medians and deviations of runs cannot be added up:
 --     the smallest and the largest median of any publisher stand for them.
 -- grain: one row per topic, publishing node and group of runs
--- like: queries.topics-rate, topics_latency
 -- column: label_group, topic_name, publisher, runs
 -- column: count BIGINT              Publications
 -- column: rate_hz, period_min_ns

@@ -2,7 +2,6 @@
 -- description: As the query waits says it of one run. The median of several callbacks is off
 --     by less than 1 %, all else is exact.
 -- grain: one row per node, callback and group of runs
--- like: queries.waits, action_latency
 -- column: label_group, node, callback, runs
 -- column: count BIGINT              Callback instances
 -- column: delayed_min, delayed_max, wait_median_ns, wait_max_ns, busy_worst_ns, busy_total_min_ns,

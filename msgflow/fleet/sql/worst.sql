@@ -4,14 +4,9 @@
 -- grain: one row per flow
 -- param: path VARCHAR  The text of a path, a glob, or a part of it
 -- param: count BIGINT {1..} = 10  Most rows
--- column: latency_ns BIGINT [ns]  From the start of the root to the end
--- column: name VARCHAR        Name of the run
--- column: run VARCHAR         Key of the run
+-- column: latency_ns, name, run
 -- column: labels VARCHAR[]    Labels of the run, KEY=VALUE
--- column: root_ns BIGINT [epoch ns]  Start of the root
--- column: path VARCHAR [path]  Nodes and topics
--- column: source VARCHAR      What it was read from
--- column: root_kind VARCHAR   'callback_instance', 'publication' or 'take'
+-- column: root_ns, path, source, root_kind
 -- column: root_id BIGINT      Identity of the root in the database of the run
 -- column: has_database BOOLEAN  The lake has the database of the run
 -- brief: latency_ns, name, labels, run, root_ns, source

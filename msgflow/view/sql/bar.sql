@@ -7,7 +7,7 @@
 --     their pauses.
 -- grain: one row per bar
 -- kind: inline
--- column: run_id BIGINT  Run
+-- column: run_id
 -- column: row_key BIGINT  Row of the timeline, see row.sql; of requests and responses that of the
 --     client, else of the service, else of the process
 -- column: kind UTINYINT  0 callback instance, 1 publication, 2 take, 3 request, 4 response; of
@@ -16,7 +16,7 @@
 --     at the end of its publication; 13 to 18: see thread_bar.sql
 -- column: id BIGINT  Identity of the thing within its kind; of threads the first callback instance
 --     in it, of events the one inside which they happened, -1: none
--- column: start_ns BIGINT [epoch ns]  Begin
+-- column: start_ns
 -- column: end_ns BIGINT [epoch ns]  End; the begin where the end was not seen
 -- column: flags UTINYINT  1: lost events may hide a part; 2: an end was not seen; 4: called with
 --     an intra-process message; 8: nested in another callback instance; 16: dropped, 32: lost, neither: not known

@@ -1,9 +1,7 @@
 -- description: Instances of a callback by pieces of time, with the longest of each.
 -- grain: one row per piece of time in which an instance began
--- param: callback BIGINT  The callback
--- param: bins BIGINT {1..2000} = 80  Number of pieces
--- column: start_at BIGINT [ns since origin]  Begin of the piece
--- column: length BIGINT [ns]  Length of the piece
+-- param: callback, bins
+-- column: start_at, length
 -- column: count BIGINT  Instances that began in it
 -- column: median BIGINT [ns]  Median duration; NULL: none was seen to end
 -- column: duration BIGINT [ns]  Longest duration

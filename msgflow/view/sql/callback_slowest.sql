@@ -1,10 +1,9 @@
 -- description: The instances of a callback that ran longest, as callbacks --each lists them.
 -- grain: one row per callback instance
--- param: callback BIGINT  The callback
--- param: limit BIGINT {1..50000} = 10  Most rows
+-- param: callback, limit
 -- column: start_at BIGINT [ns since origin]  When it began
 -- column: duration BIGINT [ns]  How long it ran
--- column: callback_instance_id BIGINT  Identity of the instance
+-- column: callback_instance_id BIGINT  Identity of the callback instance
 SELECT start_ns - $origin_ns AS start_at, end_ns - start_ns AS duration, callback_instance_id
 FROM main.callback_instance
 WHERE run_id = $run

@@ -2,11 +2,10 @@
 --     message that led to it (of what a timer began, from the first that it led to) to the last
 --     take that it led to. Where it led to none, to the last take that led to it.
 -- grain: one row per picked thing; none where its flow has no take
--- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
--- param: id BIGINT  Its identity
+-- param: kind, id
 -- column: from_topic VARCHAR  Topic of the first message
 -- column: to_topic VARCHAR  Topic of the last take
--- column: take_id BIGINT  That take
+-- column: take_id BIGINT  Identity of the take
 WITH reached AS MATERIALIZED (
     SELECT kind, id, true AS is_effect FROM main.flow_forward($kind, $id)
     UNION ALL

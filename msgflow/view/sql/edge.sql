@@ -5,7 +5,7 @@
 -- column: to_id BIGINT  Its identity
 -- column: from_kind UTINYINT  Cause
 -- column: from_id BIGINT  Its identity
--- column: link_kind VARCHAR  'transport', 'callback', 'service' or the kind of a causal link
+-- column: link_kind
 WITH held AS (SELECT kind, id FROM segment WHERE kind < 5),
 code AS (
     SELECT unnest(

@@ -2,7 +2,7 @@
 --     the node in whose callbacks they happened, else of the process.
 -- grain: one row per row of the timeline
 -- kind: inline
--- column: run_id BIGINT  Run
+-- column: run_id
 -- column: row_key BIGINT  Identity of the row: -4 times that of its first event
 -- column: process_id BIGINT  Identity of the process
 -- column: node_id BIGINT  Identity of the node; NULL: none, or not known

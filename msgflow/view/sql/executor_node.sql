@@ -1,9 +1,9 @@
 -- description: Nodes, and the executors that ran their callbacks.
 -- grain: one row per node and executor that ran a callback of it
 -- column: node VARCHAR  Full name of the node, or its process in brackets
--- column: host VARCHAR  Machine or container
+-- column: host
 -- column: process VARCHAR  Name of the process and its pid
--- column: executor_id BIGINT  The executor
+-- column: executor_id
 -- column: executor_kind VARCHAR  Its kind
 -- column: threads BIGINT  Threads that it has
 WITH ran AS (

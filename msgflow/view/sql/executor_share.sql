@@ -2,9 +2,7 @@
 --     whose executor tells nothing of itself, takes and callbacks alone are known.
 -- grain: one row per thread, piece of time and activity
 -- param: bins BIGINT {1..2000} = 200  Number of pieces
--- column: thread_id BIGINT  The thread
--- column: start_at BIGINT [ns since origin]  Begin of the piece
--- column: length BIGINT [ns]  Length of the piece
+-- column: thread_id, start_at, length
 -- column: activity VARCHAR  'wait', 'select', 'callback' (or a take, or a service) or 'blocked'
 -- column: busy BIGINT [ns]  Time of the piece with it
 WITH extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width),

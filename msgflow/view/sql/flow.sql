@@ -1,22 +1,19 @@
 -- description: Everything that the picked thing caused, or was caused by, or both
 --     (main.flow_both), as bars, and the links between them.
 -- grain: one row per vertex of the flow and link that leads to it; one for a vertex without
--- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
--- param: id BIGINT  Its identity
--- param: direction VARCHAR = 'both'  'forward' (effects), 'backward' (causes) or 'both'
+-- param: kind, id, direction
 -- param: steps BIGINT {1..50000} = NULL  Most steps each way, three per message; any number when NULL
 -- param: limit BIGINT {1..50000} = 20000  Most vertices, those nearest in time
 -- column: kind UTINYINT  As in bar.sql
--- column: id BIGINT  Identity of the vertex
--- column: row_key BIGINT  Row of the timeline
+-- column: id, row_key
 -- column: start_at BIGINT [ns since origin]  Begin
 -- column: length BIGINT [ns]  Length
--- column: flags UTINYINT  As in bar.sql
+-- column: flags
 -- column: is_effect BOOLEAN  What was picked led to it
 -- column: is_cause BOOLEAN  It led to what was picked
 -- column: from_kind UTINYINT  Where a link comes from; NULL: nowhere
 -- column: from_id BIGINT  Its identity
--- column: link_kind VARCHAR  'transport', 'callback', 'service' or the kind of a causal link
+-- column: link_kind
 -- column: vertex_count BIGINT  Vertices of the whole flow
 WITH code AS (
     SELECT unnest(

@@ -1,7 +1,7 @@
 -- description: Where events are missing, by host.
 -- grain: one row per gap of a trace
 -- param: limit BIGINT {1..50000} = 20000  Most gaps, the longest
--- column: host VARCHAR  Machine or container
+-- column: host
 -- column: kind VARCHAR  'loss', 'packets' or 'pause'
 -- column: start_at BIGINT [ns since origin]  Begin
 -- column: length BIGINT [ns]  Length

@@ -1,15 +1,16 @@
 -- description: What segments.sql gives for bins of some length, counted once for the whole run, put
 --     together to longer bins.
 -- grain: one row per bar, or per row of the timeline, kind and bin with shorter ones
+-- reads: level
 -- param: bin_ns BIGINT  Length of a bin, a multiple of that of the level
--- column: row_key BIGINT  Row of the timeline
+-- column: row_key
 -- column: kind UTINYINT  Kind of the bar
 -- column: id BIGINT  Identity of the thing; NULL: several in one bin
 -- column: start_at BIGINT [ns since origin]  Begin of the bar, or of the bin
 -- column: length BIGINT [ns]  Length of the bar, or of the bin
--- column: flags UTINYINT  As in bar.sql
+-- column: flags
 -- column: count BIGINT  Bars in the bin; 1 for a bar
--- column: busy BIGINT [ns]  Sum of their lengths
+-- column: busy
 SELECT row_key, kind, id, start_at, length, flags, count, busy
 FROM level
 WHERE run_id = $run

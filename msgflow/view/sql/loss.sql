@@ -1,17 +1,17 @@
 -- description: What `msgflow query topics --measure unmatched` lists one by one, counted by topic,
 --     receiving node and reason.
 -- grain: one row per topic, receiving node, status and reason
--- column: topic VARCHAR  Topic
+-- column: topic
 -- column: subscriber VARCHAR  Node that should have taken, or took
 -- column: status VARCHAR  'dropped', 'lost', 'not_connected', 'cut_by_recording',
 --     'unknown' or 'orphan' (a take without a publication)
--- column: reason VARCHAR  Why the other side is missing
+-- column: reason
 -- column: count BIGINT  Messages, or takes
 -- column: first_at BIGINT [ns since origin]  The first of them
 -- column: last_at BIGINT [ns since origin]  The last of them
 -- column: kind VARCHAR  What the first one is: 'publication' or 'take'
 -- column: id BIGINT  Identity of the first one
--- column: is_internal BOOLEAN  ROS uses the topic for itself
+-- column: is_internal
 SELECT
     s.topic_name AS topic,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,

@@ -2,13 +2,11 @@
 --     of time, topic and reason.
 -- grain: one row per piece of time, topic and reason
 -- param: bins BIGINT {1..2000} = 100  Number of pieces
--- column: start_at BIGINT [ns since origin]  Begin of the piece
--- column: length BIGINT [ns]  Length of the piece
--- column: topic VARCHAR  Topic
+-- column: start_at, length, topic
 -- column: status VARCHAR  As in loss
--- column: reason VARCHAR  Why the other side is missing
+-- column: reason
 -- column: count BIGINT  Messages, or takes
--- column: is_internal BOOLEAN  ROS uses the topic for itself
+-- column: is_internal
 WITH extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width)
 SELECT
     $start_ns - $origin_ns + (m.at_ns - $start_ns) // e.width * e.width AS start_at,

@@ -1,14 +1,13 @@
 -- description: Messages that a subscription did not take, and takes whose publication is not known.
 -- grain: one row per publication and subscription without a take, or take without a publication
 -- kind: inline
--- column: run_id BIGINT  Run
--- column: at_ns BIGINT [epoch ns]  Start of the publication, or the take
+-- column: run_id, at_ns
 -- column: kind VARCHAR  'publication' or 'take': the side that is known
 -- column: id BIGINT  Identity of the publication or take
--- column: subscription_id BIGINT  Subscription
+-- column: subscription_id
 -- column: process_id BIGINT  Process that should have taken, or took
 -- column: status VARCHAR  As in stat_delivery; 'orphan': a take without a publication
--- column: reason VARCHAR  Why the other side is missing
+-- column: reason
 SELECT
     d.run_id, b.start_ns AS at_ns, 'publication' AS kind, d.publication_id AS id,
     d.subscription_id, s.process_id, d.status, d.reason

@@ -2,9 +2,9 @@
 -- grain: one row per path
 -- column: path_id BIGINT  Number of the path
 -- column: path VARCHAR  Nodes and topics
--- column: topics VARCHAR[]  Topics in order
+-- column: topics
 -- column: publishers BIGINT[]  Publishers in order
--- column: subscriptions BIGINT[]  Subscriptions in order
+-- column: subscriptions
 -- column: is_cut BOOLEAN  The path goes on or has siblings beyond the limits of the search
 -- column: is_comparable BOOLEAN  The clocks of all its hosts were brought together, or are one
 WITH path AS MATERIALIZED (

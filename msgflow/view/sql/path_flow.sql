@@ -1,9 +1,9 @@
 -- description: The flows that e2e-latency counts: the first arrival of each root, or why there is
 --     none. Kept by the page for its pictures of single paths.
 -- grain: one row per path and root
--- like: path_slowest
--- param: start_ns BIGINT  Begin of the window of roots, epoch ns
--- column: path_id, root_kind, root_id, root_at
+-- param: start_ns
+-- column: path_id BIGINT  Number of the path
+-- column: root_kind, root_id, root_at
 -- column: take_id BIGINT  Take at the end of the path; NULL: not reached
 -- column: latency BIGINT [ns]  From the start of the root to the end; NULL: not reached, or a message
 --     on the way was stored until its subscription existed

@@ -1,9 +1,9 @@
 -- description: How many flows of a path took how long, in bins of one width.
 -- grain: one row per bin with flows
--- param: path BIGINT  Number of the path
+-- reads: flow
+-- param: path
 -- param: bins BIGINT {1..2000} = 60  Number of bins
--- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin
--- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
+-- param: begin_at, end_at
 -- column: bin BIGINT  Position of the bin, from 0
 -- column: low BIGINT [ns]  Least latency of the bin
 -- column: width BIGINT [ns]  Width of the bins

@@ -1,12 +1,12 @@
 -- description: Flows of a path one by one, or, where they are many, the slowest of each piece of
 --     time with the median of the piece.
 -- grain: one row per flow, or per piece of time with flows
--- like: path_slowest
--- param: path BIGINT  Number of the path
+-- reads: flow
+-- param: path
 -- param: limit BIGINT {1..50000} = 2000  Most rows
 -- param: begin_at, end_at
 -- column: root_at, root_kind, root_id
--- column: take_id BIGINT  Take at the end; NULL: not reached
+-- column: take_id BIGINT  Take at the end of the path; NULL: not reached
 -- column: latency BIGINT [ns]  Latency; of the slowest in the piece
 -- column: median BIGINT [ns]  Median of the piece; the latency itself where flows are one by one
 -- column: count BIGINT  Flows in the piece

@@ -1,10 +1,10 @@
 -- description: The distribution of the latency of a path: latencies that occurred, such that a
 --     share of the flows took no longer.
 -- grain: one row per share
--- param: path BIGINT  Number of the path
+-- reads: flow
+-- param: path
 -- param: steps BIGINT {1..2000} = 200  Number of shares
--- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin
--- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
+-- param: begin_at, end_at
 -- column: share DOUBLE  Share of the flows, 0 to 1
 -- column: latency BIGINT [ns]  Latency that they did not exceed
 WITH ranked AS (

@@ -1,13 +1,11 @@
 -- description: The slowest flows of a path, or of every path.
 -- grain: one row per flow
+-- reads: flow
 -- param: path BIGINT = NULL  Number of the path; every one when NULL
 -- param: limit BIGINT {1..50000} = 10  Most flows of a path
--- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin
--- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
+-- param: begin_at, end_at
 -- column: path_id BIGINT  Number of the path
--- column: root_at BIGINT [ns since origin]  Start of the root
--- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
--- column: root_id BIGINT  Identity of the root
+-- column: root_at, root_kind, root_id
 -- column: take_id BIGINT  Take at the end
 -- column: latency BIGINT [ns]  Latency
 SELECT path_id, root_at, root_kind, root_id, take_id, latency

@@ -1,8 +1,7 @@
 -- description: The run that a publication, take, callback instance, request or response is in.
 -- grain: one row, none for an identity that nothing has
--- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
--- param: id BIGINT  Its identity
--- column: run_id BIGINT  The run
+-- param: kind, id
+-- column: run_id
 SELECT run_id FROM main.publication WHERE $kind = 'publication' AND publication_id = $id
 UNION ALL
 SELECT run_id FROM main.take WHERE $kind = 'take' AND take_id = $id

@@ -2,8 +2,7 @@
 --     a window of time is chosen.
 -- grain: one row per piece of time in which something began
 -- param: bins BIGINT {1..2000} = 300  Number of pieces
--- column: start_at BIGINT [ns since origin]  Begin of the piece
--- column: length BIGINT [ns]  Length of the piece
+-- column: start_at, length
 -- column: count BIGINT  What began in it
 WITH began AS (
     SELECT start_ns AS at_ns FROM main.publication WHERE run_id = $run

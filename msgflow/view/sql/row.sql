@@ -13,13 +13,13 @@
 -- column: object_id BIGINT  Identity of the timer, subscription, …; of 'middleware' the process, of
 --     'state' the node, of 'event' the first, of 'core' its number and 8192 times that of its host
 --     (Linux has no more cores)
--- column: host VARCHAR  Machine or container
+-- column: host
 -- column: process VARCHAR  Name of the process and its pid; of cores 'cores'
 -- column: process_id BIGINT  Identity of the process; of cores minus that of the host
 -- column: node VARCHAR  Full name of the node; NULL: none, or not known
 -- column: label VARCHAR  Period, topic, service, name of the event, or thread
 -- column: symbol VARCHAR  Functions registered for its callbacks
--- column: is_internal BOOLEAN  Infrastructure of ROS
+-- column: is_internal
 WITH symbol AS (
     SELECT timer_id, subscription_id, service_id,
         string_agg(DISTINCT symbol, ', ' ORDER BY symbol) AS symbol

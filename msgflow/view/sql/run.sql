@@ -4,7 +4,7 @@
 -- column: name VARCHAR  Its name
 -- column: start_text VARCHAR  First event, epoch ns in digits: too long for a number of a browser
 -- column: length BIGINT [ns]  From the first event to the last
--- column: event_count BIGINT  Events read
+-- column: event_count
 -- column: host_count BIGINT  Machines and containers
 -- column: msgflow_version VARCHAR  Version that read it
 SELECT

@@ -5,9 +5,9 @@
 -- column: row_key BIGINT  Row of the timeline, see row.sql
 -- column: kind UTINYINT  As in bar.sql
 -- column: id BIGINT  Identity of the thing within its kind
--- column: start_ns BIGINT [epoch ns]  Begin
+-- column: start_ns
 -- column: end_ns BIGINT [epoch ns]  End; the begin where the end was not seen
--- column: flags UTINYINT  As in bar.sql
+-- column: flags
 SELECT row_key, kind, id, start_ns, end_ns, flags
 FROM bar
 WHERE run_id = $run AND start_ns < $end_ns AND end_ns >= $start_ns

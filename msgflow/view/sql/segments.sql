@@ -1,11 +1,15 @@
 -- description: What the timeline draws in a window. With a bin, bars shorter than it are counted
 --     per row, kind and bin, and only longer ones come one by one.
 -- grain: one row per bar, or per row of the timeline, kind and bin with shorter ones
--- like: level
 -- param: bin_ns BIGINT = NULL  Length of a bin; NULL: every bar comes one by one
--- column: row_key, kind, id, start_at, length
+-- column: row_key
+-- column: kind UTINYINT  Kind of the bar
+-- column: id BIGINT  Identity of the thing; NULL: several in one bin
+-- column: start_at BIGINT [ns since origin]  Begin of the bar, or of the bin
+-- column: length BIGINT [ns]  Length of the bar, or of the bin
 -- column: flags UTINYINT  As in segment.sql
--- column: count, busy
+-- column: count BIGINT  Bars in the bin; 1 for a bar
+-- column: busy
 SELECT
     row_key, kind, id,
     start_ns - $origin_ns AS start_at,

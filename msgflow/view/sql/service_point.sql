@@ -1,9 +1,7 @@
 -- description: Calls of one client of a service by pieces of time, with the longest of each.
 -- grain: one row per piece of time in which a call began
--- param: client BIGINT = NULL  Client that called; NULL: not known
--- param: bins BIGINT {1..2000} = 80  Number of pieces
--- column: start_at BIGINT [ns since origin]  Begin of the piece
--- column: length BIGINT [ns]  Length of the piece
+-- param: client, bins
+-- column: start_at, length
 -- column: count BIGINT  Calls that began in it
 -- column: answered BIGINT  Of these, those with a round trip
 -- column: median BIGINT [ns]  Median round trip

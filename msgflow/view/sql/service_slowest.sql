@@ -1,7 +1,6 @@
 -- description: The calls of one client of a service with the longest round trip.
 -- grain: one row per request
--- param: client BIGINT = NULL  Client that called; NULL: not known
--- param: limit BIGINT {1..50000} = 10  Most rows
+-- param: client, limit
 -- column: start_at BIGINT [ns since origin]  When the request was sent
 -- column: duration BIGINT [ns]  Round trip
 -- column: request_id BIGINT  Identity of the request

@@ -3,14 +3,13 @@
 --     took a core from a thread of a ROS process is known.
 -- grain: one row per bar
 -- kind: inline
--- column: run_id BIGINT  Run
+-- column: run_id
 -- column: row_key BIGINT  Row of the timeline, see row.sql
 -- column: kind UTINYINT  13 running, 14 preempted, 15 runnable, 16 sleeping, 17 uninterruptible,
 --     18 unknown
 -- column: id BIGINT  Of a thread what took its CPU, or woke it; of a core what ran there, or took
 --     it: see thread_name.sql. -1: nothing, or not known
--- column: start_ns BIGINT [epoch ns]  Begin
--- column: end_ns BIGINT [epoch ns]  End
+-- column: start_ns, end_ns
 -- column: flags UTINYINT  1: kernel events were lost; what woke it: 16 timer, 32 interrupt,
 --     48 softirq, neither: a thread
 SELECT

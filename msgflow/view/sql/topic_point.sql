@@ -1,10 +1,8 @@
 -- description: Messages of a topic by pieces of time: how many were published and taken, how long
 --     the takes took from publication to take, and the slowest of them.
 -- grain: one row per piece of time with a publication or a take
--- param: topic VARCHAR = NULL  Topic; NULL: that without a known name
--- param: bins BIGINT {1..2000} = 80  Number of pieces
--- column: start_at BIGINT [ns since origin]  Begin of the piece
--- column: length BIGINT [ns]  Length of the piece
+-- param: topic, bins
+-- column: start_at, length
 -- column: published BIGINT  Publications in it
 -- column: taken BIGINT  Takes in it
 -- column: median BIGINT [ns]  Median latency of its takes; NULL: of none it is known

@@ -1,7 +1,6 @@
 -- description: The takes of a topic with the longest latency from publication to take.
 -- grain: one row per take
--- param: topic VARCHAR = NULL  Topic; NULL: that without a known name
--- param: limit BIGINT {1..50000} = 10  Most rows
+-- param: topic, limit
 -- column: taken_at BIGINT [ns since origin]  When it was taken
 -- column: subscriber VARCHAR  Node that took it
 -- column: latency BIGINT [ns]  From the end of the publication to the take

@@ -2,7 +2,6 @@
 --     did. Only callbacks whose duration is known to differ, and that the kernel's trace of both
 --     runs shows, the greatest difference first.
 -- grain: one row per callback that two runs have
--- like: compared_instance
 -- param: run_a, run_b
 -- param: subjects VARCHAR[]  Callbacks, as main.comparison names them
 -- param: skip_first, a_window, b_window

@@ -6,6 +6,7 @@
 --     of all its instances is (`state_a` and `state_b`).
 -- grain: one row per path that both runs have, and part of it at a node; one more for each path,
 --     with all of it
+-- reads: compared, part_a, part_b, state_a, state_b
 -- column: difference_ns BIGINT [ns]  Mean of B less mean of A
 -- column: share DOUBLE [share]  Part of the difference of the path
 -- column: node VARCHAR [node]  Node, or 'between nodes'; NULL: all of the path
@@ -14,7 +15,7 @@
 -- column: what VARCHAR  Callback, or topic of the message
 -- column: a_mean_ns BIGINT [ns]  How long it took in run A, per flow
 -- column: b_mean_ns BIGINT [ns]  The same in run B
--- column: path VARCHAR [path]  Nodes and topics
+-- column: path
 -- brief: path, difference_ns, share, node, part, what, a_mean_ns, b_mean_ns
 WITH state AS (
     UNPIVOT (

@@ -2,10 +2,7 @@
 --     run, what they call not counted. Only callbacks that samples of perf saw in both, and
 --     differences beyond what is chance in so few samples (three standard deviations).
 -- grain: one row per callback and function, the greatest difference first
--- like: compared_instance
--- param: run_a, run_b
--- param: at_least DOUBLE  Smallest difference that counts as one, as a share of A
--- param: skip_first, a_window, b_window
+-- param: run_a, run_b, at_least, skip_first, a_window, b_window
 WITH instance AS (
     SELECT side = 'a' AS is_a, node, label, callback_instance_id FROM compared_instance
 ),

@@ -2,6 +2,7 @@
 -- description: A comparison (`compared`: rows of `main.comparison`) with a row for each subject,
 --     those that differ first, then the greatest change of a median.
 -- grain: one row per path, callback or topic
+-- reads: compared
 -- column: change VARCHAR            'longer', 'shorter', 'both' (of different statistics), 'only in
 --     A', 'only in B', 'about equal' (less than matters), 'none shown' (the intervals contain 0),
 --     or why it is not known: 'too few values', 'too few independent values', 'too few resamples'
@@ -20,8 +21,7 @@
 -- column: max_verdict VARCHAR       'not estimated': one value of either run says nothing of chance
 -- column: a_share DOUBLE            Share that arrived in run A
 -- column: b_share DOUBLE            Share that arrived in run B
--- column: a_count BIGINT            Values of run A
--- column: b_count BIGINT            Values of run B
+-- column: a_count, b_count
 -- column: a_ambiguous BIGINT        Of these, values that pass a link that may be another one
 -- column: b_ambiguous BIGINT        The same of run B
 -- column: path VARCHAR              Path, callback or topic

@@ -1,6 +1,6 @@
 -- description: What `internal.fleet_run_value` reads of each run.
 -- grain: one row per path, root and arrival; one per path and root that did not arrive
--- param: runs BIGINT[]  Runs
+-- param: runs
 -- param: from VARCHAR  Topics or nodes where paths start; NULL: any
 -- param: to VARCHAR  Topics or nodes where paths end; NULL: any
 -- param: skip_first DOUBLE  Seconds left out at the start of each run

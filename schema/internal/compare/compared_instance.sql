@@ -1,11 +1,7 @@
 -- kind: inline
 -- description: The callback instances of two runs, or of two windows of time, that are compared.
 -- grain: one row per side, 'a' or 'b', and callback instance in it
--- param: run_a BIGINT  Run that the other one is compared with
--- param: run_b BIGINT  The other one
--- param: skip_first DOUBLE = 0.0  Skip the first seconds of each run
--- param: a_window BIGINT[] = NULL  Begin and end of a time window of run A, epoch ns
--- param: b_window BIGINT[] = NULL  The same for run B
+-- param: run_a, run_b, skip_first, a_window, b_window
 SELECT w.side, l.node, l.label, i.callback_instance_id, i.start_ns, i.end_ns
 FROM main.callback_instance AS i
 JOIN main.callback_label AS l ON i.callback_id = l.callback_id

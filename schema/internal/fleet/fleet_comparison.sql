@@ -8,13 +8,14 @@
 --     path are of the same runs: those with flows enough for a quantile that at least half of the
 --     runs of either side allow. So none is below one that it cannot be below.
 -- grain: one row per path and statistic; paths that only one side has, too
+-- reads: measured
 -- param: z DOUBLE  Quantile of the standard normal distribution for the confidence wanted
--- param: at_least DOUBLE  Smallest difference that counts as one, as a share of A
+-- param: at_least
 -- param: least_units BIGINT  Fewest runs of either side for an interval
--- column: statistic VARCHAR  'median', 'mean', 'p95', 'p99' or 'max'
+-- column: statistic
 -- column: a_ns BIGINT [ns]  Its value in a typical run of side A
 -- column: b_ns BIGINT [ns]  Its value in a typical run of side B
--- column: change_percent DOUBLE  Difference in percent of A; NULL where A is not positive
+-- column: change_percent
 -- column: low_percent DOUBLE  Lower end of the confidence interval of the change
 -- column: high_percent DOUBLE  Its upper end
 -- column: verdict VARCHAR  'B is longer' or 'B is shorter' where both ends have one sign, or 'about
@@ -23,9 +24,7 @@
 --     in B'
 -- column: a_spread_percent DOUBLE  Width of the middle half of the runs of A, in percent
 -- column: b_spread_percent DOUBLE  Width of the middle half of the runs of B, in percent
--- column: difference_ns BIGINT [ns]  B less A
--- column: low_ns BIGINT [ns]  Lower end of the confidence interval of the difference
--- column: high_ns BIGINT [ns]  Its upper end
+-- column: difference_ns, low_ns, high_ns
 -- column: a_count BIGINT  Runs of A whose values count
 -- column: b_count BIGINT  Runs of B whose values count
 -- column: a_flows BIGINT  Flows measured in all runs of A

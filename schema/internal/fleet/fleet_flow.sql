@@ -3,27 +3,23 @@
 --     of one), each with its path. The query e2e-latency summarises these rows for a run. The rows
 --     of several runs together give its answer for all of them.
 -- grain: one row per path, root and arrival; one per path and root that did not arrive
--- column: run_id BIGINT  Run
+-- column: run_id
 -- column: path VARCHAR  Nodes and topics of the path
 -- column: path_id BIGINT  Number of the path in the run: several paths may have one text
--- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
+-- column: root_kind
 -- column: root_id BIGINT  Identity of the root in the run
--- column: root_ns BIGINT [epoch ns]  Start of the root
+-- column: root_ns
 -- column: take_id BIGINT  Take at the end of the path; NULL: not reached
 -- column: sink_event VARCHAR  Event that ended the flow: 'callback_end', or 'take' where the sink
 --     never shows a callback
--- column: sink_ns BIGINT [epoch ns]  End of the flow
+-- column: sink_ns
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end; NULL: not reached, or a
 --     message on the way was stored until its subscription existed
--- column: status VARCHAR  'reached', 'superseded', 'dropped', 'lost', 'no_output',
---     'not_connected', 'cut_by_recording' or 'unknown'
+-- column: status
 -- column: reason VARCHAR  Why it did not arrive
--- column: is_first BOOLEAN  First arrival of the root; NULL: it did not arrive
--- column: is_last BOOLEAN  Last arrival of the root; NULL: it did not arrive
--- column: is_newest BOOLEAN  Newest root of the arrival; NULL: it did not arrive
+-- column: is_first, is_last, is_newest
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time
--- column: is_ambiguous BOOLEAN  It passes a link that may be another one (a candidate_count above
---     1)
+-- column: is_ambiguous
 SELECT
     e.run_id, p.path, e.path_id, e.root_kind, e.root_id, e.root_ns, e.take_id, e.sink_event,
     e.sink_ns, e.latency_ns, e.status, e.reason, e.is_first, e.is_last, e.is_newest,

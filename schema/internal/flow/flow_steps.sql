@@ -6,8 +6,7 @@
 --     And how long a message was stored, until its subscription existed (stored_ns). And the
 --     services that a callback instance called and waited for (calls).
 -- grain: one row per vertex and link that leads to it
--- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
--- param: id BIGINT  Its identity
+-- param: kind, id
 -- param: direction VARCHAR {forward|backward|both} = 'both'  Follow what it caused, what caused it,
 --     or both
 -- param: depth INTEGER {0..} = 32  Maximum number of messages in a row, each way

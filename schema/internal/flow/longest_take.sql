@@ -4,7 +4,7 @@
 -- grain: at most one row
 -- param: kind VARCHAR  'take', 'publication' or 'callback_instance'
 -- param: id BIGINT  Which one
--- column: take_id BIGINT  The take
+-- column: take_id BIGINT  Identity of the take
 -- column: topic_name VARCHAR [topic]  Its topic
 -- column: run_id BIGINT  Its run
 SELECT t.take_id, s.topic_name, t.run_id

@@ -1,12 +1,9 @@
 -- description: What belongs to flows that reached the end of their paths: callback instances,
 --     publications, takes, and the requests and responses between them.
 -- grain: one row per vertex
--- param: start_ns BIGINT  Begin of the window of roots, epoch ns
+-- param: start_ns
 -- param: end_ns BIGINT  End of the window of roots, epoch ns
--- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
--- param: to VARCHAR = NULL  Topics or nodes where flows end, likewise
--- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
--- param: without VARCHAR = NULL  Only flows through none of these
+-- param: from, to, via, without
 -- param: slowest BIGINT = NULL  So many of the slowest flows; NULL: all
 WITH path AS (
     SELECT path_id

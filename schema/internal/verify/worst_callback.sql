@@ -1,6 +1,6 @@
 -- description: Of the instances of a callback that ended, the longest that began in the window.
 -- grain: one row, or none
--- param: key BIGINT  Callback
+-- param: key
 SELECT
     end_ns - start_ns AS duration_ns,
     start_ns AS at_ns, callback_instance_id AS id,

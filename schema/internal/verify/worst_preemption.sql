@@ -1,7 +1,7 @@
 -- description: Of the instances of a callback that began in the window, the one in which other
 --     threads had the CPU for longest.
 -- grain: one row, or none
--- param: key BIGINT  Callback
+-- param: key
 SELECT
     s.preempted_ns AS duration_ns, i.start_ns AS at_ns, i.callback_instance_id AS id,
     'callback_instance' AS kind

@@ -2,6 +2,7 @@
 -- description: How long the callbacks on the paths of an explanation ran and waited, and for what.
 --     95 % of their instances took no longer.
 -- grain: one row per node and callback
+-- reads: breakdown, explained_wait
 -- column: node VARCHAR  Node
 -- column: label VARCHAR  What triggers the callback
 -- column: usual_ns BIGINT [ns]  Median duration
@@ -14,7 +15,7 @@
 -- column: cpu_by VARCHAR  What had it longest
 -- column: call_ns BIGINT [ns]  Calls of services for whose response it waited
 -- column: service_name VARCHAR  The service that it waited for longest
--- column: server VARCHAR  Node that offers it, or process in brackets; NULL: not in the trace
+-- column: server
 -- column: served_ns BIGINT [ns]  Median time in which it answers; NULL: not known
 -- column: is_recorded BOOLEAN  Requests show it; else that its callback ran within this one
 -- column: own_ns BIGINT [ns]  Before it, its executor ran the callback for earlier messages

@@ -10,8 +10,7 @@
 -- grain: one row per callback instance that is not nested in another
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
 --     instances that began after the last of these moments are left out (where all are NULL: none)
--- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
--- param: has_teams BOOLEAN = true  Executors have several threads; false: each has one
+-- param: has_calls, has_teams
 CREATE OR REPLACE MACRO derive.callback_ready(
     executors, has_calls := true, has_teams := true
 ) AS TABLE

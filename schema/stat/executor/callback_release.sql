@@ -7,7 +7,7 @@
 -- grain: one row per callback instance that is not nested in another
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
 --     instances that began after the last of these moments are left out (where all are NULL: none)
--- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
+-- param: has_calls
 CREATE OR REPLACE MACRO derive.callback_release(executors, has_calls := true) AS TABLE
 -- A callback may have run elsewhere before.
 WITH every_run AS (

@@ -2,7 +2,7 @@
 --     main.executor_wait.
 -- grain: one row per waiting callback instance
 -- param: waits VARCHAR  Name of rows as of derive.callback_ready
--- param: has_teams BOOLEAN = true  Executors have several threads; false: each has one
+-- param: has_teams
 CREATE OR REPLACE MACRO derive.executor_waits(waits, has_teams := true) AS TABLE
 WITH stretch AS MATERIALIZED (
     SELECT executor_id, start_ns, end_ns, before_ns, callback_instance_id, previous_end_ns

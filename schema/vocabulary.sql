@@ -1,0 +1,224 @@
+-- title: Vocabulary
+-- description: Parameters and columns that return in headers, one meaning each. A header that names
+--     one alone takes it from here; a file in which it means something else declares it itself.
+-- param: a_window BIGINT[] = NULL  Begin and end of a time window of run A, epoch ns
+-- param: at_least DOUBLE  Smallest difference that counts as one, as a share of A
+-- param: at_quantile DOUBLE = NULL  In place of the slowest flows the one with this quantile of the
+--     latency, 0 to 1
+-- param: b_window BIGINT[] = NULL  Begin and end of a time window of run B, epoch ns
+-- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin
+-- param: bins BIGINT {1..2000} = 80  Number of pieces
+-- param: callback BIGINT  The callback
+-- param: case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
+--     count: the first or last arrival of each root, the newest root of each arrival, or all
+-- param: chains VARCHAR = 'chain_here'  Name of a table with the rows of main.flow_chain for the
+--     same arguments, where there is one
+-- param: client BIGINT = NULL  Client that called; NULL: not known
+-- param: direction VARCHAR = 'both'  'forward' (effects), 'backward' (causes) or 'both'
+-- param: end_at BIGINT = NULL  Only flows that began before this time, ns since origin
+-- param: flow_case VARCHAR {first|last|newest|every_pair} = 'first'  Pairs of root and arrival that
+--     count: the first or last arrival of each root, the newest root of each arrival, or all
+-- param: flows VARCHAR  Name of the rows of main.end_to_end_flow: a table, or a part of the query
+-- param: from VARCHAR = NULL  Topics or nodes where flows start: globs, with commas between
+-- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that starts the
+--     clock
+-- param: from_topic VARCHAR = NULL  Topics or nodes where flows start: names or globs, separated by
+--     commas; NULL: any
+-- param: has_calls BOOLEAN = true  Services were called; false: no call is looked up
+-- param: has_kernel BOOLEAN = true  A kernel trace was read; false: nothing is looked up in it
+-- param: has_teams BOOLEAN = true  Executors have several threads; false: each has one
+-- param: id BIGINT  Its identity
+-- param: key BIGINT  Callback
+-- param: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
+-- param: limit BIGINT {1..50000} = 10  Most rows
+-- param: max_depth BIGINT {1..} = 32  Longest path, in topics
+-- param: max_paths BIGINT {1..} = 1000  Most paths, the shortest first, and most chains of a length
+-- param: most_flows INTEGER = NULL  How many flows, the slowest first; NULL: all
+-- param: path BIGINT  Number of the path
+-- param: path_ids BIGINT[] = NULL  Only these paths; NULL: all
+-- param: run_a BIGINT  Run A, that run B is compared with
+-- param: run_b BIGINT  Run B
+-- param: runs BIGINT[]  Runs to look at
+-- param: seed BIGINT = 0  Random seed
+-- param: sink_take_id BIGINT = NULL  Only flows that end with this take
+-- param: skip_first DOUBLE = 0.0  Skip the first seconds of each run
+-- param: start_id BIGINT  Identity of the vertex to start from
+-- param: start_kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
+-- param: start_ns BIGINT  Begin of the window of roots, epoch ns
+-- param: to VARCHAR = NULL  Topics or nodes where flows end: globs, with commas between
+-- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that stops the
+--     clock
+-- param: to_topic VARCHAR = NULL  Topics or nodes where flows end: names or globs, separated by
+--     commas; NULL: any
+-- param: topic VARCHAR = NULL  Topic; NULL: that without a known name
+-- param: trail VARCHAR  Name of the rows of main.end_to_end_trail: a table, or a part of the query
+-- param: via VARCHAR = NULL  Only flows through all of these topics or nodes
+-- param: waits VARCHAR = 'wait_here'  Name of a table of when inputs became ready, by the clocks of
+--     the executors, where there is one
+-- param: what VARCHAR {paths|ends|callbacks|topics} = 'paths'  End-to-end latency of paths, or
+--     between two topics by any path, duration of callbacks, or time from publication to take of
+--     topics
+-- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive; NULL:
+--     any
+-- param: window_start_ns BIGINT = NULL  Start of the time window of roots, epoch ns; NULL: any
+-- param: without VARCHAR = NULL  Only flows through none of these
+-- column: a_count BIGINT  Values of run A
+-- column: action_name VARCHAR  Name of the action
+-- column: activity VARCHAR  What happened: the part itself; up to a take 'network_or_idle',
+--     'executor_busy' (it ran something else), 'all_threads_busy', 'blocked' (a callback ran that
+--     excludes the waiting one) or 'undecided' (nothing shows when the message arrived); in a cache
+--     'timer' (not due yet), 'unpublished' (the message that was waited for), or a part of that
+--     message's own flow
+-- column: ambiguous BIGINT  Links with more than one candidate
+-- column: at_ns BIGINT [epoch ns]  Start of the publication, or the take
+-- column: b_count BIGINT  Values of run B
+-- column: blocked_max_ns BIGINT [ns]  Part of busy_max_ns for which a thread was free, but a
+--     callback ran that never runs beside this one
+-- column: busy BIGINT [ns]  Sum of their lengths
+-- column: busy_max_ns BIGINT [ns]  Executor busy with other callbacks from earliest_ns on
+-- column: busy_min_ns BIGINT [ns]  Executor busy with other callbacks from latest_ns on
+-- column: by_kind VARCHAR  What took the CPU, or ended the sleep: 'thread', 'timer', 'interrupt' or
+--     'softirq'. NULL: not known, or the state needs none
+-- column: by_other_thread_id BIGINT  Thread of another process that took the CPU, or ended the
+--     sleep
+-- column: by_priority INTEGER  Priority of the thread that took the CPU; NULL: not known
+-- column: by_thread_id BIGINT  Thread of a ROS process that took the CPU, or ended the sleep
+-- column: callback VARCHAR [callback]  What triggers it
+-- column: callback_id BIGINT  Identity of the callback
+-- column: callback_instance_id BIGINT  Callback instance that it is, or that it waits for
+-- column: cause VARCHAR  Where it comes from, as a rule
+-- column: change_percent DOUBLE  Difference in percent of A; NULL where A is not positive
+-- column: count BIGINT  Callback instances that began in the time window
+-- column: created_ns BIGINT [epoch ns]  When it was created
+-- column: cure VARCHAR  What to do about it
+-- column: depth BIGINT  Steps (topics) of the chain
+-- column: difference_ns BIGINT [ns]  B less A
+-- column: duration_ns BIGINT [ns]  to_ns - from_ns
+-- column: earliest_ns BIGINT [epoch ns]  It was not ready before; NULL: not known
+-- column: end_ns BIGINT [epoch ns]  End
+-- column: event_count BIGINT  Events read
+-- column: executor_id BIGINT  Identity of the executor
+-- column: first_topic VARCHAR [topic]  Topic of the first message
+-- column: flags UTINYINT  As in bar.sql
+-- column: flow_id BIGINT  Number of the flow in this result
+-- column: flow_rank BIGINT  Number of the flow, the longest first
+-- column: from_id BIGINT  Identity of the cause
+-- column: from_ns BIGINT [epoch ns]  Begin
+-- column: held_max_ns BIGINT [ns]  From earliest_ns on, no thread of an executor of several waited
+--     for work, though not all ran callbacks: they were blocked by its lock, or looked for work; or
+--     the thread that ran this callback had picked it, and did not start it yet. Not part of
+--     busy_max_ns. Of an executor of one thread: the time between two waits for which it ran no
+--     callback, if that is a millisecond or more. NULL: not known, or less
+-- column: high_ns BIGINT [ns]  Upper end of the confidence interval of the difference
+-- column: hop BIGINT  Number of the message on the path that it belongs or leads to
+-- column: host VARCHAR [host]  Machine or container
+-- column: id BIGINT  Identity of the vertex
+-- column: idle_ns BIGINT [ns]  Executor waiting for work from earliest_ns on, until a thread picked
+--     this callback; NULL: not known
+-- column: is_ambiguous BOOLEAN  It passes a link that may be another one (a candidate_count above
+--     1)
+-- column: is_cached BOOLEAN  The last step may wait in its node for other messages
+-- column: is_certain BOOLEAN  For 'executor_busy', 'all_threads_busy' and 'blocked': what waited
+--     was ready by then; false: it may have arrived meanwhile. NULL for others
+-- column: is_cut BOOLEAN  The path goes on or has siblings beyond max_depth or max_paths
+-- column: is_first BOOLEAN  First arrival of the root; NULL: it did not arrive
+-- column: is_internal BOOLEAN  Infrastructure of ROS, or what ROS uses for itself
+-- column: is_last BOOLEAN  Last arrival of the root; NULL: it did not arrive
+-- column: is_loss_affected BOOLEAN  A gap of the trace lies in it
+-- column: is_newest BOOLEAN  Newest root of the arrival; NULL: it did not arrive
+-- column: is_path BOOLEAN  The chain is a path, not only the beginning of some
+-- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
+-- column: label VARCHAR  What it is: a topic or service, or what triggers the callback
+-- column: label_group BIGINT  Group of runs
+-- column: last_topic VARCHAR [topic]  Topic of the last message
+-- column: latency_ns BIGINT [ns]  From the start of the root to the end
+-- column: latest_ns BIGINT [epoch ns]  It was ready by then
+-- column: length BIGINT [ns]  Length of the piece
+-- column: link_kind VARCHAR  'transport', 'callback', 'service' or the kind of a causal link
+-- column: low_ns BIGINT [ns]  Lower end of the confidence interval of the difference
+-- column: max_ns BIGINT [ns]  Longest duration
+-- column: mean_ns BIGINT [ns]  Mean duration
+-- column: median_ns BIGINT [ns]  Median duration
+-- column: min_ns BIGINT [ns]  Shortest latency
+-- column: name VARCHAR  Name of the run
+-- column: node VARCHAR [node]  Node of the callback
+-- column: node_id BIGINT  Node it belongs to
+-- column: nodes VARCHAR  First two nodes of its process, and how many more; without nodes its name
+--     and id
+-- column: origin_ns BIGINT [epoch ns]  Moment from which it can have been due
+-- column: p95_ns BIGINT [ns]  95 % of them are at most this
+-- column: p99_ns BIGINT [ns]  99 % of them are at most this
+-- column: parent_path_id BIGINT  The chain without its last step; NULL: it has one step
+-- column: part VARCHAR  'callback' (from its start, or from the take where none shows, to what it
+--     publishes or calls), 'cache' (from the end of the callback to the callback instance that
+--     publishes for it), 'intra', 'rclcpp', 'rcl', 'rmw', 'dds' (publishing, from this layer to the
+--     next), 'publish' (publishing, layer not known), 'stored' (from the last layer until the
+--     subscription existed, of a message that was published before), 'publish_to_take' (from there,
+--     or from the last layer, to the take: writing the message, the network, an idle executor or a
+--     busy one, see main.executor_wait), 'take_to_callback', 'request_to_take' (from the sending of
+--     a request), 'service' (from the start of the service callback to what it publishes or calls,
+--     or to the sending of the response), 'response_to_take' (from there on; what the client does
+--     then is a 'callback' again, from the take on)
+-- column: path VARCHAR [path]  Nodes and topics
+-- column: path_id BIGINT  Path, as main.flow_path numbers it for the same arguments
+-- column: period_median_ns BIGINT [ns]  Median time from one start to the next
+-- column: pid INTEGER  Process id
+-- column: position BIGINT  Order within the flow, from 1
+-- column: preempted_ns BIGINT [ns]  Likewise, another thread had the CPU that its thread had lost
+-- column: priority INTEGER  Its priority, as the kernel has it: 0 to 99 real-time, 100 to 139 nice
+--     -20 to 19
+-- column: process VARCHAR  Process name
+-- column: process_id BIGINT  Process it lives in
+-- column: publication_count BIGINT  Messages published
+-- column: publication_id BIGINT  Identity of the publication
+-- column: publisher_count BIGINT  Publishers
+-- column: publisher_id BIGINT  Last publisher; below 0: not traced
+-- column: reason VARCHAR  Why the other side is missing
+-- column: request_id BIGINT  Request whose response the callback of the part waits for
+-- column: root_at BIGINT [ns since origin]  Start of the root
+-- column: root_id BIGINT  Identity of the root
+-- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
+-- column: root_ns BIGINT [epoch ns]  Start of the root
+-- column: row_key BIGINT  Row of the timeline
+-- column: run VARCHAR  Key of the run
+-- column: run_id BIGINT  Run
+-- column: running_p99_ns BIGINT [ns]  99 % of the CPU times are at most this
+-- column: runs BIGINT  Runs that have it
+-- column: samples BIGINT  Samples in which it ran, or what it called
+-- column: self_samples BIGINT  Samples in which it ran
+-- column: server VARCHAR  Node that offers it, or process in brackets; NULL: not in the trace
+-- column: shortest_message_ns BIGINT [ns]  Shortest delay of a message, after correction
+-- column: shortest_packet_ns BIGINT [ns]  Shortest delay of a packet, after correction
+-- column: since VARCHAR  What origin_ns is: 'publication' (its end), 'stamp' (of a message whose
+--     publication is not known, by the clock of its host), 'request' (sent), 'timer' (due); NULL:
+--     not known
+-- column: sink_event VARCHAR  Event that ended the flow: to_event, or 'take' where the sink never
+--     shows a callback
+-- column: sink_ns BIGINT [epoch ns]  End of the flow
+-- column: source VARCHAR  What it was read from
+-- column: start_at BIGINT [ns since origin]  Begin of the piece
+-- column: start_ns BIGINT [epoch ns]  Begin
+-- column: state VARCHAR  State of the thread, as in main.schedule_piece; NULL: not traced by the
+--     kernel, or no thread's doing
+-- column: state_thread_id BIGINT  The thread in that state
+-- column: statistic VARCHAR  'median', 'mean', 'p95', 'p99' or 'max'
+-- column: status VARCHAR  'reached', 'superseded', 'dropped', 'lost', 'no_output', 'not_connected',
+--     'cut_by_recording' or 'unknown'
+-- column: subscription_count BIGINT  Subscriptions
+-- column: subscription_id BIGINT  Identity of the subscription
+-- column: subscriptions BIGINT[]  Subscriptions in order
+-- column: symbol VARCHAR  Function registered for the callback
+-- column: take_count BIGINT  Messages handed over to a subscription
+-- column: take_id BIGINT  Take at the end of the path
+-- column: thread_id BIGINT  Identity of the thread
+-- column: tid INTEGER  Thread id
+-- column: title VARCHAR  What was found
+-- column: to_ns BIGINT [epoch ns]  End
+-- column: topic VARCHAR  Topic
+-- column: topic_name VARCHAR  Topic of the message
+-- column: topics VARCHAR[]  Topics in order
+-- column: total_ns BIGINT [ns]  Sum of the durations
+-- column: total_share DOUBLE [share]  Part in which it ran, or what it called
+-- column: wait_ns BIGINT [ns]  From origin_ns to start_ns
+-- column: wakers BIGINT  How many wakers lead to the thread: 0 for the one that the piece is of
+-- column: what VARCHAR  The callback, or the topic of the message
