@@ -614,7 +614,15 @@ CREATE TABLE store.finding (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     trace_id BIGINT,  -- Trace it is about; NULL: not one trace alone {to trace}
     name VARCHAR NOT NULL,  -- Kind of finding: its file in `schema/health`
-    subject VARCHAR,  -- Where: a trace, process, host, topic; NULL: the trace, or all of the phase
+    host_id BIGINT,  -- Host it is about; NULL: see below, or not one host alone {to host}
+    process_id BIGINT,  -- Process it is about, likewise {to process}
+    thread_id BIGINT,  -- Thread it is about, likewise {to thread}
+    node_id BIGINT,  -- Node it is about; of two that a topic joins, the one that subscribes {to
+        -- node}
+    publishing_node_id BIGINT,  -- Of two nodes, the one that publishes {to node}
+    topic_name VARCHAR,  -- Topic it is about
+    layer VARCHAR,  -- Kind of event that is missing: 'requests', 'goals', …
+    subject VARCHAR,  -- Where, in words; NULL: what the columns before say
     count BIGINT,  -- How often
     detail VARCHAR  -- Numbers, and what they mean
 );

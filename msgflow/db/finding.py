@@ -10,10 +10,11 @@ phase, which decides when the query runs and what it reads:
 | recording | whenever links or clocks of a run change | `store`, `derive`, `main` |
 | database | for `msgflow check --detail` | `store` |
 
-A query returns `count` and `detail`, and where it applies `subject` (the place, in words) and
-`trace_id`; those that do not read `staging` return `run_id` too, and may use `$run_id`. The rows of
-the first two phases are stored in `store.finding`. The view `main.finding` adds what the headers
-say. The phase database is about msgflow itself: no ingest looks for what it can find.
+A query returns columns of the table `store.finding`: `count` and `detail`, the place as a column
+(`node_id`, `topic_name`), else in words (`subject`); those that do not read `staging` return
+`run_id` too, and may use `$run_id`. The rows of the first two phases are stored in that table. The
+view `main.finding` adds what the headers say. The phase database is about msgflow itself: no ingest
+looks for what it can find.
 """
 
 from __future__ import annotations
@@ -33,12 +34,6 @@ if TYPE_CHECKING:
     import duckdb
 
 SEVERITIES = ("error", "warning", "info")
-
-# Gives the columns that a query may leave out, and the types of all.
-_NO_ROW = (
-    "SELECT NULL::BIGINT AS run_id, NULL::BIGINT AS trace_id, NULL::VARCHAR AS subject, "
-    "NULL::BIGINT AS count, NULL::VARCHAR AS detail WHERE false"
-)
 
 # What the header of a kind says of each of its findings.
 _OF_KIND = "name, phase, severity, title, description, cause, cure"
@@ -148,10 +143,13 @@ def statement(headers: Sequence[Header]) -> str:
 
     `run_id` is NULL in those of the phase input.
     """
+    # Gives the columns that a query may leave out, and the types of all.
+    columns = store_tables()["finding"].columns.values()
+    no_row = ", ".join(f"NULL::{column.type} AS {column.name}" for column in columns)
     return "\nUNION ALL\n".join(
-        f"SELECT run_id, trace_id, '{short_name(header)}' AS name, subject, "
-        "count::BIGINT AS count, detail\n"
-        f"FROM (\n{_NO_ROW}\nUNION ALL BY NAME (\n{_statements().text(short_name(header))})\n)"
+        f"SELECT * REPLACE ('{short_name(header)}' AS name, count::BIGINT AS count)\n"
+        f"FROM (\nSELECT {no_row} WHERE false\n"
+        f"UNION ALL BY NAME (\n{_statements().text(short_name(header))})\n)"
         for header in headers
     )
 

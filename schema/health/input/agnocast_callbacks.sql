@@ -8,10 +8,9 @@
 -- severity: info
 -- when: staging.agnocast_run
 SELECT
-    l.label AS subject,
+    p.process_id,
     count(*) AS count,
     printf('%d callbacks on %d threads', count(*), count(DISTINCT p.thread_id)) AS detail
 FROM staging.callback_pair AS p
 JOIN staging.agnocast_run AS a ON p.start_event_id = a.start_event_id
-JOIN process_label AS l ON p.process_id = l.process_id
-GROUP BY p.process_id, l.label
+GROUP BY p.process_id

@@ -9,11 +9,9 @@
 -- severity: warning
 -- when: staging.executor_polled
 SELECT
-    l.label AS subject,
-    sum(p.polls)::BIGINT AS count,
-    printf(
-        'polled %d times, of %d waits in all', sum(p.polls)::BIGINT, sum(p.waits)::BIGINT
-    ) AS detail
-FROM staging.executor_polled AS p
-JOIN process_label AS l ON p.process_id = l.process_id
-GROUP BY p.process_id, l.label
+    process_id,
+    sum(polls)::BIGINT AS count,
+    printf('polled %d times, of %d waits in all', sum(polls)::BIGINT, sum(waits)::BIGINT)
+        AS detail
+FROM staging.executor_polled
+GROUP BY process_id

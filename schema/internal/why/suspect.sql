@@ -210,10 +210,7 @@ sampled AS (
 awake AS (
     SELECT n.full_name AS node, min(f.detail) AS detail
     FROM store.finding AS f
-    JOIN main.process AS p
-        ON f.run_id = p.run_id
-        AND starts_with(f.subject, printf('%s %d on ', coalesce(p.name, '?'), p.pid))
-    JOIN main.node AS n ON p.process_id = n.process_id
+    JOIN main.node AS n ON f.process_id = n.process_id
     WHERE f.name = 'busy_waiting' AND list_contains($runs, f.run_id)
     GROUP BY n.full_name
 ),

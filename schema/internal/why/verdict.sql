@@ -12,26 +12,25 @@
 -- column: path VARCHAR [path]  Path that it delays most: of equal ones the first by name
 -- column: sentence VARCHAR  The sentence
 WITH step AS (
-    SELECT DISTINCT unnest(string_split(path, ' → ')) AS name FROM path_row
-),
-known AS (
-    SELECT full_name AS name FROM main.node WHERE list_contains($runs, run_id)
-    UNION ALL
-    SELECT topic_name FROM main.subscription WHERE list_contains($runs, run_id)
+    SELECT list_distinct(flatten(list(string_split(path, ' → ')))) AS names FROM path_row
 ),
 -- Of these paths, or of the recording as a whole.
 touching AS (
     SELECT
         f.name, f.title, f.subject, f.detail,
         row_number() OVER (ORDER BY f.severity, f.name, f.subject, f.detail) AS place
-    FROM (SELECT *, regexp_extract_all(subject, '/[\w/]+') AS names FROM main.finding) AS f
+    FROM main.finding AS f
+    LEFT JOIN main.node AS n ON f.node_id = n.node_id
+    LEFT JOIN main.node AS p ON f.publishing_node_id = p.node_id
     WHERE list_contains($runs, f.run_id)
         AND f.severity IN ('error', 'warning')
         -- The verdict has sentences of its own for these, or they delay nothing by themselves.
         AND f.name NOT IN ('dead_end', 'executor_preempted', 'busy_waiting')
         AND (
-            list_has_any(f.names, (SELECT list(name) FROM step))
-            OR NOT list_has_any(f.names, (SELECT list(name) FROM known))
+            coalesce(f.topic_name, n.full_name, p.full_name) IS NULL
+            OR list_has_any(
+                (SELECT names FROM step), [f.topic_name, n.full_name, p.full_name]
+            )
         )
 ),
 found AS (
