@@ -6,7 +6,7 @@
 --     have no latency, and are left out.
 -- grain: one row per flow and piece, node or activity
 -- like: e2e-latency, functions
--- steps: path_chain, path_outcome, named_path
+-- reads: path_chain, path_outcome, named_path
 -- param: from VARCHAR = NULL  Topics or nodes where flows start
 -- param: to, via, without
 -- param: slowest BIGINT {1..} = 1  Number of flows

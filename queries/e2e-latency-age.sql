@@ -5,7 +5,7 @@
 --     age. The time window applies to outputs.
 -- grain: one row per path
 -- like: e2e-latency
--- steps: path_chain
+-- reads: path_chain
 -- param: from, to
 -- param: from_event VARCHAR {callback_start|publish} = 'callback_start'  Event that is the input
 -- param: to_event VARCHAR {take|callback_start|callback_end} = 'callback_end'  Event that is the

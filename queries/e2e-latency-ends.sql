@@ -6,7 +6,7 @@
 --     --to: else there is a row for each two topics between which a path leads.
 -- grain: one row per topic where flows start, topic where they end, and node that takes it
 -- like: e2e-latency, main.end_to_end_between
--- steps: path_chain, path_outcome, named_path
+-- reads: path_outcome, named_path
 -- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id, first_topic, last_topic, node
 -- column: paths BIGINT             Paths between them

@@ -7,7 +7,7 @@
 --     the later input.
 -- grain: one row per path
 -- like: e2e-latency-age
--- steps: path_chain, every_outcome
+-- reads: path_chain, every_outcome
 -- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: inputs BIGINT            Inputs in the time window

@@ -8,7 +8,7 @@
 --     callback_start.
 -- grain: one row per path and response time
 -- like: e2e-latency-reaction
--- steps: path_chain, every_outcome, answered_input
+-- reads: path_chain, answered_input
 -- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: response VARCHAR         'all', 'best', 'worst' or 'worst-with-external-latency'

@@ -3,7 +3,7 @@
 --     when the end of the path was reached and how long that took, or why it was not.
 -- grain: one row per path and root, or per pair of root and arrival
 -- like: e2e-latency, main.end_to_end
--- steps: path_chain, path_outcome, named_path
+-- reads: path_outcome, named_path
 -- param: from, to, from_event, to_event, case
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
 -- param: max_paths

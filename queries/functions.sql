@@ -29,17 +29,18 @@
 -- column: is_internal BOOLEAN      Infrastructure of ROS
 -- brief: callback, function, self_share, total_share, per_call_ns, node, self_ns, samples, file
 -- note: samples
-CREATE OR REPLACE TEMP TABLE path_chain AS
+CREATE OR REPLACE TEMP TABLE function_chain AS
 FROM main.flow_chain($runs, $from, $to);
 
 CREATE OR REPLACE TEMP TABLE function_outcome AS
 FROM main.end_to_end(
-    $runs, $from, $to, 'callback_start', 'callback_end', $start_ns, $end_ns, chains := 'path_chain'
+    $runs, $from, $to, 'callback_start', 'callback_end', $start_ns, $end_ns,
+    chains := 'function_chain'
 )
 WHERE coalesce($from, $to, $via, $without) IS NOT NULL
     AND path_id IN (
         SELECT path_id
-        FROM main.flow_path($runs, only_paths := true, chains := 'path_chain')
+        FROM main.flow_path($runs, only_paths := true, chains := 'function_chain')
         WHERE main.path_visits(path, $via, $without)
     );
 
@@ -48,7 +49,7 @@ SELECT *, row_number() OVER (ORDER BY latency_ns DESC, flow_id) AS place
 FROM main.chosen_flow('function_outcome', most_flows := $slowest);
 
 CREATE OR REPLACE TEMP TABLE function_trail AS
-FROM main.end_to_end_trail('function_flow', $runs, chains := 'path_chain');
+FROM main.end_to_end_trail('function_flow', $runs, chains := 'function_chain');
 
 -- The place counts from the slowest flow that it is on the way of, or the longest instance.
 CREATE OR REPLACE TEMP TABLE function_instance AS

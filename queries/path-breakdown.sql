@@ -11,7 +11,7 @@
 --     (overlaps).
 -- grain: one row per path, hop, part, and callback that it belongs to
 -- like: e2e-latency
--- steps: path_chain, path_outcome, named_path
+-- reads: path_chain, path_outcome, named_path
 -- param: from, to, from_event, to_event, case
 -- param: max_depth BIGINT {1..} = 32     Longest path, in topics
 -- param: max_paths

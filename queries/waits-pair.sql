@@ -6,7 +6,7 @@
 --     kernel was traced, what had the CPU while the thread waited for one has rows of its own.
 -- grain: one row per waiting callback and callback that ran meanwhile, or thread that had the CPU
 -- like: path-breakdown
--- steps: exact_arrival
+-- reads: exact_arrival
 -- column: run_id
 -- column: node VARCHAR [node]  Node of the callback that waited
 -- column: callback VARCHAR [callback]  What triggers it

@@ -102,7 +102,7 @@ def derivation_hash() -> str:
     return objects.hash_of(
         text
         for header in headers
-        for text in (header.name, header.body, str((header.sources, header.also, header.unites)))
+        for text in (header.name, header.body, str((header.sources, header.also, header.reads)))
     )
 
 
@@ -123,11 +123,11 @@ def derive_table(con: duckdb.DuckDBPyConnection, name: str, run_id: int) -> None
 
 def _united(con: duckdb.DuckDBPyConnection, header: Header, run_id: int) -> str:
     """Return the WITH clause for the objects that one unites, of those that may have rows."""
-    if not header.unites:
+    if not header.united:
         return ""
     values = {"run_id": run_id}
     parts = [
-        name for name in header.unites if may_have_rows(con, _header(name).sources, values, _of_run)
+        name for name in header.united if may_have_rows(con, _header(name).sources, values, _of_run)
     ]
     rows = " UNION ALL BY NAME ".join(f"FROM {_of_run(name)}" for name in parts)
     return f"WITH united AS MATERIALIZED ({rows}) "
@@ -138,7 +138,7 @@ def _of_run(name: str) -> str:
     if name.startswith("store.") or _header(name).kind == "view":
         return f"(FROM {name} WHERE run_id = $run_id)"
     header = _header(name)
-    words = ["'united'"] if header.unites else []
+    words = ["'united'"] if header.united else []
     parts = (f"{part} := ${part}" for part in RECORDED if f"{part} := true" in header.body)
     return f"{name}({', '.join([*words, '$run_id', *parts])})"
 

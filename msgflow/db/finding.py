@@ -20,7 +20,7 @@ looks for what it can find.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -37,15 +37,6 @@ SEVERITIES = ("error", "warning", "info")
 
 # What the header of a kind says of each of its findings.
 _OF_KIND = "name, phase, severity, title, description, cause, cure"
-
-# By the name of a finding: what shows more of it, or cures it.
-_AFTER = {
-    "dead_end": "msgflow suggest links",
-    "topic_unnamed": "msgflow suggest links",
-    "unmatched_take": "msgflow query topics --measure unmatched",
-    "process_without_rclcpp": "msgflow query path-breakdown",
-    "clock_not_synchronised": "msgflow clocks",
-}
 
 
 @dataclass(frozen=True)
@@ -193,11 +184,11 @@ def next_command(findings: Sequence[Finding]) -> str:
     return "msgflow why" if is_sound else "msgflow check"
 
 
-def commands_after(findings: Sequence[Finding]) -> list[str]:
+def commands_after(findings: Sequence[Finding]) -> list[tuple[str, ...]]:
     """Return the commands that a reader of the findings runs next; the last one is `why`."""
-    names = {finding.name for finding in findings}
-    after = dict.fromkeys(command for name, command in _AFTER.items() if name in names)
-    return [*after, "msgflow why"]
+    headers = {short_name(header): header for header in kinds()}
+    after = (headers[each.name].next_command(asdict(each)) for each in findings)
+    return [*dict.fromkeys(words for words in after if words), ("why",)]
 
 
 def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:

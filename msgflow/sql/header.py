@@ -15,11 +15,11 @@
     -- note: clocks
     -- when: staging.gap
     -- also: derive.a_b
-    -- unites: derive.a_c, derive.a_d
+    -- reads: path_chain, derive.a_c
+    -- next: query topics --topic {topic_name} | check
     -- variant: measure VARCHAR {latency|age} = 'latency'  What is measured
     -- like: main.end_to_end, main.flow_path
     -- column: run_id, path_id, root_ns
-    -- steps: path_chain
 
 The header ends at the first line that is not a `--` comment. Two spaces end a parameter's default.
 The name of the object is that of its file; below `schema/` the schema that the objects of its
@@ -44,12 +44,17 @@ folder are in stands before. Only what others put in front of theirs says its ki
   the empty table is made by its statement in `schema/model.sql`.
 - `also`: objects whose rows are stored in the table of this one, too. Each has a `when` of its own,
   so that what few recordings have is planned only there.
-- `unites`: objects whose rows a macro reads as one table. Its first argument is the name of that
-  table, its second the run. An object whose `when` finds no row is left out.
+- `reads`: tables that the statement reads, and that something else makes: a step of another query
+  of the folder, which then comes first, with what that step reads; else the program, before it runs
+  the statement. Names with a schema are objects of `schema/`: an ingest makes one table of the rows
+  of all of them, and gives its name to the macro as the first argument, the run as the second. An
+  object whose `when` finds no row is left out.
+- `next`: the command that shows more, or cures: words behind `msgflow`. `{node}` stands for the
+  value of that column in the row, as one word. Of several, with ` | ` between them, the first holds
+  whose columns all have values.
 
 - `like`: other files of the folder, of `schema/public` (main.NAME) or `queries` (queries.NAME). A
   `param` or a `column` may be a list of names: the first of these files that has it declares it.
-- `steps`: tables that the files of `like` make. A query makes them first, and then its own.
 - `variant`: a parameter whose values are queries of their own. The default is this file, and `age`
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
   A query may have several: each value of them is one file.
@@ -58,7 +63,7 @@ The unit of a column may also say what the column names: 'node', 'topic', 'callb
 'path'. Options that choose rows by them use it. In a public view over the table of the same name, a
 column may stand by its name alone: the table declares the rest. Files in `schema/health` have a
 `severity`, a `cause` and a `cure`. An object is made after all objects that its statement, its
-`when`, its `also` or its `unites` names.
+`when`, its `also` or its `reads` names.
 
 Outside of `schema/public`, what most statements take needs no declaration: the run (`run`,
 `run_id`, or `only_run` of a macro) or `runs`; `start_ns` and `end_ns`, a window of time in epoch
@@ -77,6 +82,7 @@ What few recordings have may stand behind `WHERE $has_kernel`, or another name o
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
@@ -101,6 +107,9 @@ _STEP = re.compile(
     r"CREATE OR REPLACE TEMP TABLE (?P<table>[a-z_]+) AS\n.*?;\n+",
     re.DOTALL,
 )
+_MADE = re.compile(r"^CREATE OR REPLACE TEMP TABLE ([a-z_]+) AS$", re.MULTILINE)
+_WORD = re.compile(r"[a-z_]+")
+_PLACEHOLDER = re.compile(r"\{([a-z_]+)\}")
 _COMMENT = re.compile(r"--[^\n]*")
 # Without a word's begin, which would take twice the time. No alias ends like a schema.
 _OBJECT = re.compile(r"(?:raw|staging|store|derive|main)\.[a-z_0-9]+\b")
@@ -126,7 +135,7 @@ SCHEMAS = {
 }
 # Fields of a header that have the text that stands there, or the names.
 _TEXTS = ("severity", "cause", "cure", "note", "slowest", "zero")
-_LISTS = ("brief", "answer", "heading", "also", "unites")
+_LISTS = ("brief", "answer", "heading", "also", "reads")
 _Item = TypeVar("_Item", "Param", "Column")
 
 
@@ -197,7 +206,8 @@ class Header:
     steps: tuple[Step, ...] = ()  # what a query makes before, in order
     sources: tuple[tuple[str, str], ...] = ()  # of `when`, each with its condition or ''
     also: tuple[str, ...] = ()  # objects whose rows are stored in the same table
-    unites: tuple[str, ...] = ()  # objects whose rows a macro takes together
+    reads: tuple[str, ...] = ()  # tables that others make, and objects whose rows become one
+    next: tuple[tuple[str, ...], ...] = ()  # commands, each the words behind `msgflow`
     variants: tuple[Param, ...] = ()
     # of a variant: the name of the query, and the option that chooses this one
     chosen: str | None = None
@@ -226,7 +236,12 @@ class Header:
         A name in a string counts, since a table may be given to a macro by name.
         """
         named = (name for text in self.statements for name in _OBJECT.findall(_code(text)))
-        return tuple(sorted({*named, *self.when, *self.also, *self.unites} - {self.name}))
+        return tuple(sorted({*named, *self.when, *self.also, *self.united} - {self.name}))
+
+    @property
+    def united(self) -> tuple[str, ...]:
+        """The objects of `reads`, whose rows a macro takes as one table."""
+        return tuple(name for name in self.reads if "." in name)
 
     @cached_property
     def relations(self) -> frozenset[str]:
@@ -242,6 +257,14 @@ class Header:
     def has_window(self) -> bool:
         """Whether there is a window of time to give."""
         return any("$start_ns" in statement for statement in self.statements)
+
+    def next_command(self, row: Mapping[str, object]) -> tuple[str, ...] | None:
+        """Return the words behind `msgflow` of the command that shows more of a row."""
+        for words in self.next:
+            columns = _PLACEHOLDER.findall(" ".join(words))
+            if all(row.get(column) is not None for column in columns):
+                return tuple(_PLACEHOLDER.sub(lambda place: str(row[place[1]]), w) for w in words)
+        return None
 
 
 @dataclass(frozen=True)
@@ -263,15 +286,12 @@ def parse(text: str, path: Path) -> Header:
     like = [_like(name, path) for name in reversed(_names(single.get("like", "")))]
     known_params = {param.name: param for header in like for param in header.params}
     known_columns = {column.name: column for header in like for column in header.columns}
-    known_steps = {step.table: step for header in like for step in header.steps}
     of_table = path.parent.name == "public"
     params = _declared("param", fields, partial(_params, known_params), path)
     variants = _declared("variant", fields, partial(_params, {}), path)
     columns = _declared("column", fields, partial(_columns, known_columns, of_table), path)
-    for table in reversed(_names(single.get("steps", ""))):
-        if table not in known_steps:
-            raise _error(path, 1, f"nothing makes this table — {table}")
-        steps = (known_steps[table], *steps)
+    if "reads" in single:
+        steps = (*_read_steps(_names(single["reads"]), path), *steps)
     name = name_of(path)
     return Header(
         name=name,
@@ -286,6 +306,7 @@ def parse(text: str, path: Path) -> Header:
         steps=steps,
         sources=_sources(single.get("when", "")),
         variants=variants,
+        next=tuple(tuple(shlex.split(one)) for one in single.get("next", "").split(" | ") if one),
         **{key: single.get(key) for key in _TEXTS},  # type: ignore[arg-type]
         **{key: _names(single.get(key, "")) for key in _LISTS},  # type: ignore[arg-type]
     )
@@ -355,6 +376,31 @@ def _names(text: str) -> tuple[str, ...]:
 def _sources(text: str) -> tuple[tuple[str, str], ...]:
     parts = (part.partition(" WHERE ") for part in _NEXT_SOURCE.split(text) if part)
     return tuple((name, condition) for name, _, condition in parts)
+
+
+def _read_steps(tables: Iterable[str], path: Path) -> tuple[Step, ...]:
+    """Return the steps of other queries that make these tables, and what those steps read."""
+    found: dict[str, Step] = {}
+    for table in tables:
+        if (maker := _makers(path.parent).get(table, path)) == path:
+            continue
+        wanted, steps = {table}, []
+        for step in reversed(_declaring(maker).steps):
+            if step.table in wanted:
+                steps.append(step)
+                wanted.update(_WORD.findall(_code(step.sql)))
+        found |= {step.table: step for step in reversed(steps)}
+    return tuple(found.values())
+
+
+@cache
+def _makers(folder: Path) -> Mapping[str, Path]:
+    """Return for each table that a step makes in a folder the file of the step."""
+    return {
+        table: path
+        for path in sorted(folder.glob("*.sql"))
+        for table in _MADE.findall(path.read_text(encoding="utf-8"))
+    }
 
 
 def _like(name: str, path: Path) -> Header:

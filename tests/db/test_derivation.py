@@ -96,7 +96,7 @@ def test_the_hash_follows_the_rules_that_are_stored(monkeypatch: pytest.MonkeyPa
     # Nor is anything stored that an object leaves out, or takes together with others.
     for field, other in (
         ("sources", (("store.take", "method = 'x'"),)),
-        ("unites", ("main.take",)),
+        ("reads", ("main.take",)),
     ):
         assert hashes(links[0], **{field: other}) != now, field
     derivation.derivation_hash.cache_clear()
@@ -108,7 +108,7 @@ TABLES = {
     for header in objects.views()
     for table in derivation.derived_tables()
     if header.name == f"derive.{table}"
-    for name in (header.name, *header.also, *header.unites)
+    for name in (header.name, *header.also, *header.united)
 }
 SOMETIMES_EMPTY = {
     header.name: header for header in objects.views() if header.when and header.name in TABLES

@@ -82,7 +82,7 @@ def test_an_object_needs_what_its_statements_name() -> None:
     header = parse_with(
         "-- when: staging.d, derive.f\n"
         "-- also: derive.g\n"
-        "-- unites: derive.h\n"
+        "-- reads: derive.h, made\n"
         "CREATE OR REPLACE TEMP TABLE step AS\nFROM store.c;\n\n"
         "WITH e AS (FROM main.b) -- not main.x\nSELECT derive.f(e.main, 'a.b') FROM e\n"
         "JOIN query_table('raw.a') USING (id)"
@@ -161,14 +161,24 @@ def test_names_alone_are_declared_by_the_first_file_that_has_them(tmp_path: Path
 
 
 def test_steps_of_another_file_come_first(tmp_path: Path) -> None:
-    head, step = "-- description: x\n", "CREATE OR REPLACE TEMP TABLE {} AS\nSELECT 1;\n\n"
-    made = "".join(map(step.format, ("first", "other")))
+    head, step = "-- description: x\n", "CREATE OR REPLACE TEMP TABLE {} AS\nFROM {};\n\n"
+    made = "".join(
+        step.format(*names) for names in (("first", "a"), ("other", "b"), ("c", "first"))
+    )
     (tmp_path / "a.sql").write_text(f"{head}{made}SELECT 1\n")
-    text = f"{head}-- like: a\n-- steps: first\n{step.format('own')}SELECT 1\n"
+    text = f"{head}-- reads: c, of_program\n{step.format('own', 'c')}SELECT 1\n"
+    (tmp_path / "x.sql").write_text(text)
     header = parse(text, tmp_path / "x.sql")
-    assert [made.table for made in header.steps] == ["first", "own"]
-    with pytest.raises(HeaderError, match="nothing makes this table — last"):
-        parse(text.replace("steps: first", "steps: last"), tmp_path / "x.sql")
+    assert [made.table for made in header.steps] == ["first", "c", "own"]
+    assert header.reads == ("c", "of_program")
+
+
+def test_the_next_command_is_the_first_whose_columns_have_values() -> None:
+    header = parse_with("-- next: query waits --node {node} | flow --take '{id} x' | check")
+    assert header.next_command({"node": "/a b", "id": 1}) == ("query", "waits", "--node", "/a b")
+    assert header.next_command({"node": None, "id": 1}) == ("flow", "--take", "1 x")
+    assert header.next_command({}) == ("check",)
+    assert parse_with("-- grain: one row").next_command({}) is None
 
 
 @pytest.mark.parametrize(

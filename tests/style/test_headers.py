@@ -22,7 +22,7 @@ from msgflow.db import objects
 from msgflow.query.catalogue import load_query
 from msgflow.query.selection import INTERNAL_COLUMN, KINDS, PATH
 from msgflow.sql.header import SCHEMAS, Header, read
-from msgflow.sql.statement import RECORDED, internal_sql
+from msgflow.sql.statement import RECORDED, Statements, internal_sql
 from msgflow.view.page_query import DIRECTORY, page_query
 
 FILES = sql_files()
@@ -248,6 +248,40 @@ def test_columns_of_a_view_are_those_of_its_output(
     output = described(connection.sql(f"FROM {file.header.name}"))
     if file.layer == "public" or file.header.columns:
         assert output == declared(file)
+
+
+@each(
+    [
+        (statements, name)
+        for statements in (internal_sql(), Statements(DIRECTORY))
+        for name in statements.names()
+    ],
+    name=lambda pair: pair[1],
+)
+def test_a_statement_says_which_tables_are_made_for_it(pair: tuple[Statements, str]) -> None:
+    statements, name = pair
+    header = statements.header(name)
+    own = re.findall(
+        r"(\w+)(?: ?\([^()]*\))?(?: USING KEY \(\w+\))? AS (?:NOT )?(?:MATERIALIZED )?\(",
+        header.body,
+    )
+    inline = {each for each in statements.names() if statements.header(each).kind == "inline"}
+    assert set(header.reads) == header.relations - inline - set(own)
+
+
+def test_a_query_says_which_steps_of_others_it_reads() -> None:
+    made = {
+        table: file.path
+        for file in QUERIES
+        for table in re.findall(r"TEMP TABLE (\w+) AS\n", file.path.read_text(encoding="utf-8"))
+    }
+    for file in QUERIES:
+        own = [step.sql for step in file.header.steps if made[step.table] == file.path]
+        words = set(re.findall(r"[a-z_]+", "".join([*own, file.header.body])))
+        others = {table for table, path in made.items() if path != file.path}
+        assert set(file.header.reads) == words & others, file
+    tables = [step.table for file in QUERIES for step in file.header.steps]
+    assert made.keys() == set(tables)
 
 
 @each([*(file.header for file in FILES), *OF_PACKAGE], name=lambda header: str(header.path))

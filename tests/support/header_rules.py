@@ -13,7 +13,7 @@ from msgflow.sql.value import is_integer
 REPEATABLE = {"param", "column", "variant"}
 SINGLE = {
     "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when", "also",
-    "unites", "brief", "answer", "heading", "slowest", "zero", "like", "steps",
+    "reads", "next", "brief", "answer", "heading", "slowest", "zero", "like",
 }  # fmt: skip
 NOTES = {"clocks", "callbacks", "kernel", "requests", "goals", "samples"}
 # Begins of lines above the SQL.

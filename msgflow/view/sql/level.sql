@@ -1,6 +1,7 @@
 -- description: What segments.sql gives for bins of some length, counted once for the whole run, put
 --     together to longer bins.
 -- grain: one row per bar, or per row of the timeline, kind and bin with shorter ones
+-- reads: level
 -- param: bin_ns BIGINT  Length of a bin, a multiple of that of the level
 -- column: row_key BIGINT  Row of the timeline
 -- column: kind UTINYINT  Kind of the bar

@@ -1,5 +1,6 @@
 -- description: How many flows of a path took how long, in bins of one width.
 -- grain: one row per bin with flows
+-- reads: flow
 -- param: path BIGINT  Number of the path
 -- param: bins BIGINT {1..2000} = 60  Number of bins
 -- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin

@@ -1,6 +1,7 @@
 -- description: The distribution of the latency of a path: latencies that occurred, such that a
 --     share of the flows took no longer.
 -- grain: one row per share
+-- reads: flow
 -- param: path BIGINT  Number of the path
 -- param: steps BIGINT {1..2000} = 200  Number of shares
 -- param: begin_at BIGINT = NULL  Only flows that began at this time or later, ns since origin

@@ -9,6 +9,7 @@
 -- cure: Record Python nodes with msgflow record -- COMMAND, or start them with the folder that
 --     msgflow record --print-python-path prints in front of PYTHONPATH (no rebuild). An
 --     EventsExecutor of rclpy shows nothing all the same.
+-- next: query path-breakdown
 -- grain: one row per process
 -- severity: warning
 -- when: staging.process WHERE process_id NOT IN (SELECT process_id FROM staging.callback)

@@ -4,6 +4,7 @@
 -- cause: An offset needs messages, or network packets, in both directions.
 -- cure: Give the offsets in a file: msgflow clocks apply FILE. If the hosts were synchronised while
 --     recording, do nothing.
+-- next: clocks
 -- grain: one row per clock or pair of clocks
 -- severity: warning
 -- when: derive.clocks_to_synchronise

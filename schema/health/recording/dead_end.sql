@@ -7,6 +7,7 @@
 -- cure: msgflow suggest links writes a file with the links that are likely; with --apply it
 --     declares them at once. Where a node only consumes messages, an entry of kind independent says
 --     so (docs/links.md).
+-- next: suggest links
 -- grain: one row per node and topic
 -- severity: warning
 -- when: derive.unanswered_subscription

@@ -5,6 +5,7 @@
 -- cure: Name it in a file of links: write the line shown below topics:, with the topic in place of
 --     /NAME, then msgflow links apply FILE. msgflow suggest links writes a file with a line for
 --     each (docs/links.md).
+-- next: suggest links
 -- grain: one row per topic
 -- severity: warning
 -- when: store.publisher WHERE topic_name IS NULL OR is_topic_learned OR is_topic_declared,

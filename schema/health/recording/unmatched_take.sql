@@ -6,6 +6,7 @@
 -- cure: msgflow query topics --measure unmatched gives the reason of each. The findings
 --     publisher_not_traced, publisher_without_events, trace_ends_early and message_without_stamp
 --     say what can be done.
+-- next: query topics --measure unmatched
 -- grain: one row per trace, for messages with a stamp and without
 -- severity: warning
 -- when: store.orphan_take

@@ -5,6 +5,7 @@
 --     its uncertainty, in either direction. A message is joined if exactly one publication of its
 --     topic was sent in that time, and no other message of the bag may be that one too.
 -- grain: one row per message of the bag
+-- reads: bag_read
 WITH sent AS (
     SELECT b.publication_id, p.topic_name, coalesce(b.source_timestamp_ns, b.start_ns) AS sent_ns
     FROM main.publication AS b

@@ -2,6 +2,7 @@
 -- description: How many messages of a bag were joined to their publication, and why others were
 --     not.
 -- grain: one row per topic of the bag
+-- reads: bag_joined
 -- column: topic_name VARCHAR [topic]  Name of the topic
 -- column: messages BIGINT  Messages in the bag
 -- column: joined BIGINT  Those whose publication is known

@@ -6,6 +6,7 @@
 --     of all its instances is (`state_a` and `state_b`).
 -- grain: one row per path that both runs have, and part of it at a node; one more for each path,
 --     with all of it
+-- reads: compared, part_a, part_b, state_a, state_b
 -- column: difference_ns BIGINT [ns]  Mean of B less mean of A
 -- column: share DOUBLE [share]  Part of the difference of the path
 -- column: node VARCHAR [node]  Node, or 'between nodes'; NULL: all of the path

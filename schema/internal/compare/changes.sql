@@ -2,6 +2,7 @@
 -- description: A comparison (`compared`: rows of `main.comparison`) with a row for each subject,
 --     those that differ first, then the greatest change of a median.
 -- grain: one row per path, callback or topic
+-- reads: compared
 -- column: change VARCHAR            'longer', 'shorter', 'both' (of different statistics), 'only in
 --     A', 'only in B', 'about equal' (less than matters), 'none shown' (the intervals contain 0),
 --     or why it is not known: 'too few values', 'too few independent values', 'too few resamples'

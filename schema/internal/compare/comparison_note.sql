@@ -1,6 +1,7 @@
 -- description: What the rows of a comparison of two runs (`compared`: of `main.comparison`) do not
 --     show, a sentence each: what was lost, what is left out, what verdicts are said of.
 -- grain: one row per sentence
+-- reads: compared
 -- like: comparison
 -- param: run_a, run_b, what
 WITH lost AS (

@@ -2,6 +2,7 @@
 --     allow. The measured values decide, even if the difference may be chance. The reason is NULL
 --     where side A is below 0, as of clocks that are apart: there is no percentage of it.
 -- grain: one row per condition and path, callback or topic that exceeds it
+-- reads: compared, condition
 WITH measured AS (
     SELECT
         c.place, c.text, c.statistic = 'share' AS is_share, c.is_relative, c.allowed,

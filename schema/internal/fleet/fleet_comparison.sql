@@ -8,6 +8,7 @@
 --     path are of the same runs: those with flows enough for a quantile that at least half of the
 --     runs of either side allow. So none is below one that it cannot be below.
 -- grain: one row per path and statistic; paths that only one side has, too
+-- reads: measured
 -- param: z DOUBLE  Quantile of the standard normal distribution for the confidence wanted
 -- param: at_least DOUBLE  Smallest difference that counts as one, as a share of A
 -- param: least_units BIGINT  Fewest runs of either side for an interval

@@ -2,6 +2,7 @@
 --     of a lake, and `sided`: the runs (run), the side of each (side, 'a' or 'b') and what it is a
 --     sample of (unit): itself, or the robot that made it, say.
 -- grain: one row per run, path and statistic; paths of one text in a run count together
+-- reads: e2e_latency, flow, sided
 -- param: case VARCHAR  'first' or 'last' arrival of each root, 'newest' root of each arrival, or
 --     'every_pair'
 WITH cut AS (SELECT run, bool_or(is_cut) AS is_cut FROM e2e_latency GROUP BY run),

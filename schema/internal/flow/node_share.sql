@@ -1,5 +1,6 @@
 -- description: The share of each node in the time of one path, and the largest of its parts.
 -- grain: one row per node
+-- reads: breakdown
 -- param: path VARCHAR  The path
 WITH part AS (SELECT *, row_number() OVER () AS place FROM breakdown),
 longest AS (

@@ -1,5 +1,6 @@
 -- description: Runs of the database that hold packets of `packet_batch`, which were just read.
 -- grain: one row per such run
+-- reads: packet_batch
 SELECT DISTINCT r.run_id, r.name
 FROM packet_batch AS b
 JOIN staging.source AS s ON b.trace_index = s.trace_index

@@ -1,6 +1,7 @@
 -- description: The links of a file as annotations, each once, from `matched`: nodes and topics that
 --     its entries mean. One that the trace declares, too, is not stored again.
 -- grain: one row per link of a node
+-- reads: matched
 -- column: annotation_id BIGINT  Its identity; NULL: the trace declares it
 -- column: kind VARCHAR          Kind of link
 -- column: process_id BIGINT     Process of the node

@@ -1,6 +1,7 @@
 -- description: A sentence for each node at which flows of a result pass a link that may be another
 --     one. The result (`noted`) has the way of such flows, and whether that is so (`mark`).
 -- grain: one row per finding about a node on such a way, or one in all where none names a node
+-- reads: noted
 WITH place AS (
     SELECT DISTINCT unnest(string_split(way, ' → ')) AS name FROM noted WHERE mark
 ),

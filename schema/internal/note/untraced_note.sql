@@ -1,6 +1,7 @@
 -- description: A sentence for each topic at the begin of a path of a result (`noted`) whose
 --     publisher is not traced: where its flows begin.
 -- grain: one row per topic
+-- reads: noted
 SELECT
     format(
         'what publishes {} is not traced: flows begin with {}',

@@ -2,6 +2,7 @@
 -- description: Whether a run meets its requirements: what was judged, failures first. Otherwise the
 --     order of the file stays.
 -- grain: one row per requirement and thing that it is of
+-- reads: judged
 -- column: verdict VARCHAR         'passed', 'failed', 'not measured' or 'no data'
 -- column: target VARCHAR          What the file calls it
 -- column: subject VARCHAR         What of the run it is; NULL: nothing there

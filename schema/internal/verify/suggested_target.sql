@@ -1,6 +1,8 @@
 -- description: What a good run met, and a little more, as requirements. It reads the rows of named
 --     queries, each a table of its name.
 -- grain: one row per thing with requirements
+-- reads: action_latency, e2e_latency, scheduling, scheduling_wakeup, service_latency, timers,
+--     topics_rate
 -- param: margin DOUBLE  How much more than measured is allowed, as a share
 -- param: least_values BIGINT  With fewer values, a percentile is only their largest
 WITH path AS (

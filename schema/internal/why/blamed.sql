@@ -1,6 +1,7 @@
 -- description: What took longest of a flow, in words: two pieces at most of its critical path,
 --     which it reads as `piece`. One that took less than a fifth of the latency is not to blame.
 -- grain: one row; NULL: nothing is to blame
+-- reads: piece
 -- param: path VARCHAR  Nodes and topics of the requirement: rclpy does not record its callbacks,
 --     but which node sends a message is known
 WITH slowest AS (

@@ -2,6 +2,7 @@
 -- description: Rows of critical-path: the longest pieces of one flow, in their order, and behind
 --     them the sum of all others. It has the columns of its input.
 -- grain: one row per piece
+-- reads: slow_flow
 -- param: count BIGINT  How many pieces
 WITH piece AS (SELECT *, row_number() OVER () AS place FROM slow_flow),
 longest AS (

@@ -2,6 +2,7 @@
 --     what the path lacks, the longest piece (`piece`) of its slow flow, that flow, and messages
 --     that were lost (`loss`). What the trace has no name for cannot be asked for.
 -- grain: one row per command
+-- reads: loss, piece
 -- param: has_unknown BOOLEAN  The path lacks links, or names
 -- param: since VARCHAR[]      Options that leave out a warm-up
 WITH placed AS (SELECT *, row_number() OVER () AS place FROM piece),

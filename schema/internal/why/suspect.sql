@@ -4,6 +4,7 @@
 --     it: 95 % of the messages are delayed by no more. By how much half of them are, where it only
 --     may be so: what is certain comes before a doubt. It reads what an explanation has by then.
 -- grain: one row per kind, culprit and path
+-- reads: breakdown, delivery, open_end, path_row, why_callback
 -- param: asked_ns BIGINT  Begin of what was asked for: with the warm-up, which start_ns leaves out
 -- column: kind VARCHAR  'callback', 'executor', 'cpu', 'service', 'queue', 'lost', 'late_start',
 --     'stale' or 'way'

@@ -3,6 +3,7 @@
 --     recording or the system as a whole comes first, then what delays data, or loses them. If
 --     nothing stands out, one row says what takes most of the slowest path.
 -- grain: one row per culprit
+-- reads: breakdown, path_row, suspect
 -- column: who VARCHAR  The culprit: a node, or a thread without ROS; of the recording what a
 --     finding is about; NULL: nothing stands out
 -- column: kinds VARCHAR[]  What it does, the worst first: 'callback', 'executor', 'cpu',

@@ -2,6 +2,7 @@
 -- description: The moment of the last of the longest latencies, if they all lie at the start. It
 --     reads the flows of an explanation.
 -- grain: one row
+-- reads: path_outcome
 -- column: last_ns BIGINT [epoch ns]  It had not warmed up by then; NULL: it does not warm up
 WITH flow AS (
     SELECT

@@ -2,6 +2,7 @@
 -- description: How long the callbacks on the paths of an explanation ran and waited, and for what.
 --     95 % of their instances took no longer.
 -- grain: one row per node and callback
+-- reads: breakdown, explained_wait
 -- column: node VARCHAR  Node
 -- column: label VARCHAR  What triggers the callback
 -- column: usual_ns BIGINT [ns]  Median duration

@@ -9,7 +9,7 @@
 --     nothing joins with the reader of the buffer. Where a process is several with equal ids,
 --     nothing says whose messages it sent or got.
 -- grain: one row per take whose publication is known
--- unites: derive.link_transport_exact, derive.link_transport_nearest,
+-- reads: derive.link_transport_exact, derive.link_transport_nearest,
 --     derive.link_transport_ring_buffer, derive.link_transport_agnocast
 -- param: links VARCHAR  Name of the rows of all methods
 -- param: has_gaps BOOLEAN = true  The recording has gaps; false: none is looked up
