@@ -62,6 +62,7 @@
 -- brief: rank, at_ns, duration_ns, share, activity, state, who, node, what, is_certain, pieces,
 --     hop, part, thread, wakers, priority, who_priority
 -- note: clocks
+-- next: flow --take {take_id} --why
 CREATE OR REPLACE TEMP TABLE critical_flow AS
 WITH path AS (
     SELECT path_id

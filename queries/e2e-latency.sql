@@ -50,7 +50,7 @@
 -- column: sink_event VARCHAR       Event that stopped the clock: to_event, or 'take' where the
 --     sink never shows a callback
 -- column: is_cut BOOLEAN           The path goes on or has siblings beyond max_depth or max_paths
--- column: reasons VARCHAR          Why roots did not reach the end of the path, with counts
+-- column: reasons MAP(VARCHAR, BIGINT)  Why roots did not reach the end of the path, and how many
 -- column: path VARCHAR [path]  Nodes and topics
 -- brief: path, median_ns, p99_ns, max_ns, reached, lost, ambiguous, loss_affected, dropped, roots,
 --     p95_ns, superseded, no_output, reasons, not_connected, unknown, cut_by_recording, mean_ns,
@@ -109,7 +109,7 @@ completeness AS (
         path_id,
         count(*) FILTER (is_first IS NOT false) AS roots,
         histogram(status) FILTER (is_first IS NOT false)::MAP(VARCHAR, BIGINT) AS number,
-        main.counts_text(CASE WHEN status <> 'reached' THEN reason END) AS reasons,
+        main.word_counts(CASE WHEN status <> 'reached' THEN reason END) AS reasons,
         count(DISTINCT (root_kind, root_id)) FILTER (is_loss_affected) AS loss_affected
     FROM flow
     GROUP BY path_id

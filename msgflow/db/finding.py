@@ -100,6 +100,11 @@ def kinds_with_rows(
     ]
 
 
+def kind_of(name: str) -> Header:
+    """Return the header of a kind of finding."""
+    return _statements().header(name)
+
+
 def phase_of(header: Header) -> str:
     """Return the phase of a kind of finding."""
     return header.path.parent.name
@@ -186,8 +191,7 @@ def next_command(findings: Sequence[Finding]) -> str:
 
 def commands_after(findings: Sequence[Finding]) -> list[tuple[str, ...]]:
     """Return the commands that a reader of the findings runs next; the last one is `why`."""
-    headers = {short_name(header): header for header in kinds()}
-    after = (headers[each.name].next_command(asdict(each)) for each in findings)
+    after = (kind_of(each.name).next_command(asdict(each)) for each in findings)
     return [*dict.fromkeys(words for words in after if words), ("why",)]
 
 

@@ -516,9 +516,9 @@ def _create(connection: duckdb.DuckDBPyConnection, what: str, text: str) -> None
     """Make what stands behind CREATE, with the columns that the rows of text are of."""
     head, *rows = [line for line in text.splitlines(keepends=True) if not line.startswith("#")]
     # No type that its text does not show is found: `ids::BIGINT[]`.
-    typed = dict(re.findall(r"(\w+)::([^,\n]+)", head))
+    typed = dict(re.findall(r"(\w+)::(MAP\([^)]*\)|[^,\n]+)", head))
     with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
-        file.writelines([re.sub(r"::[^,\n]+", "", head), *rows])
+        file.writelines([re.sub(r"::(MAP\([^)]*\)|[^,\n]+)", "", head), *rows])
         file.flush()
         types = f", types = {typed}" if typed else ""
         connection.execute(f"CREATE {what} AS FROM read_csv(?, header = true{types})", [file.name])

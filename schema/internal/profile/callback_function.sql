@@ -1,7 +1,10 @@
 -- description: Of some callbacks the one with most samples, and the three functions in which most
 --     of these were.
 -- grain: one row per function
+-- next: query functions --node {node} --callback {callback}
 -- param: callbacks VARCHAR[][]  Node of each, and what triggers it
+-- column: node VARCHAR  Node
+-- column: callback VARCHAR  What triggers the callback
 WITH sampled AS (
     SELECT l.node, l.label AS callback, s.stack_id, s.cpu_ns
     FROM main.stack_sample AS s

@@ -12,6 +12,8 @@
 --     half of that where it only may be so; NULL: of findings
 -- column: path VARCHAR [path]  Path that it delays most: of equal ones the first by name
 -- column: sentence VARCHAR  The sentence
+-- column: lacks VARCHAR[]  What was not recorded that would tell whether it is so: 'kernel',
+--     'callbacks'
 WITH step AS (
     SELECT list_distinct(flatten(list(string_split(path, ' → ')))) AS names FROM path_row
 ),
@@ -51,10 +53,15 @@ found AS (
 chosen AS (
     SELECT
         kind, who, what, arg_min(path, (-cost_ns, path)) AS path, max(cost_ns) AS cost_ns,
-        arg_min(clause, (-cost_ns, path)) AS clause
+        unnest(arg_min({'clause': clause, 'lacks': lacks}, (-cost_ns, path, clause)))
     FROM (
         SELECT
-            kind, coalesce(who, '?') AS who, what, path, coalesce(cost_ns, 0) AS cost_ns, clause
+            kind, coalesce(who, '?') AS who, what, path, coalesce(cost_ns, 0) AS cost_ns, lacks,
+            clause || CASE lacks
+                WHEN 'kernel' THEN ' (not known without a kernel trace)'
+                WHEN 'callbacks' THEN ' (not known without its callbacks)'
+                ELSE ''
+            END AS clause
         FROM suspect
         WHERE matters AND clause IS NOT NULL
     )
@@ -73,7 +80,8 @@ told AS (
         max(cost_ns) AS cost_ns,
         arg_min(path, (-cost_ns, kind, what)) AS path,
         printf('%s: %s', who, string_agg(clause, '; ' ORDER BY cost_ns DESC, kind, what))
-            AS sentence
+            AS sentence,
+        coalesce(list(DISTINCT lacks ORDER BY lacks) FILTER (lacks IS NOT NULL), []) AS lacks
     FROM chosen
     GROUP BY who
 ),
@@ -87,11 +95,12 @@ slowest AS (
 said AS (
     SELECT
         place, subject AS who, [name] AS kinds, NULL::BIGINT AS cost_ns,
-        NULL::VARCHAR AS path, sentence
+        NULL::VARCHAR AS path, sentence, []::VARCHAR[] AS lacks
     FROM found
     UNION ALL
     SELECT
-        1e6 + row_number() OVER (ORDER BY cost_ns DESC, who), who, kinds, cost_ns, path, sentence
+        1e6 + row_number() OVER (ORDER BY cost_ns DESC, who), who, kinds, cost_ns, path,
+        sentence, lacks
     FROM told
     UNION ALL
     SELECT
@@ -101,12 +110,13 @@ said AS (
             || ' longest on it is %s of %s, with up to %s',
             main.duration_text(s.p95_ns), coalesce(b.what, '?'), coalesce(b.node, '?'),
             main.duration_text(b.p95_ns)
-        )
+        ),
+        []
     FROM slowest AS s
     JOIN breakdown AS b ON s.path = b.path
     WHERE NOT EXISTS (FROM told)
     QUALIFY row_number() OVER (ORDER BY b.total_ns DESC, b.hop) = 1
 )
-SELECT who, kinds, cost_ns, path, sentence
+SELECT who, kinds, cost_ns, path, sentence, lacks
 FROM said
 ORDER BY place
