@@ -60,7 +60,7 @@ _STORE = """\
 -- - {hidden}: the view does not show it.
 -- - {sql EXPRESSION}: only the view has it; `self` is the row.
 
-CREATE SCHEMA store;
+CREATE SCHEMA IF NOT EXISTS store;
 """
 
 _DATA_MODEL = """\

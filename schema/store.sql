@@ -11,7 +11,7 @@
 -- - {hidden}: the view does not show it.
 -- - {sql EXPRESSION}: only the view has it; `self` is the row.
 
-CREATE SCHEMA store;
+CREATE SCHEMA IF NOT EXISTS store;
 
 -- One row per publish() call
 -- view: Messages at the moment they were published, with the time of each layer seen.
