@@ -24,7 +24,7 @@ from msgflow.files.resources import resource_directory
 from msgflow.sql.failure import database_errors
 from msgflow.sql.quoting import literal
 
-# What to do about tables that no revision upgrades: before the first release they change within one.
+# What to do about tables that no revision upgrades, as those of before the first release.
 INGEST_AGAIN = "msgflow ingest TRACE --db NEW.duckdb reads the recording again"
 
 
