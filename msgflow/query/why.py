@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import fnmatch
 import shlex
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from msgflow.db.finding import kind_of
@@ -15,7 +16,7 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.compare import warm_up_seconds
 from msgflow.query.names import with_path_numbers
 from msgflow.query.runner import Steps, run_query
-from msgflow.sql.statement import Statements, internal_sql, registered
+from msgflow.sql.statement import Statements, internal_sql, may_have_rows, registered
 from msgflow.text.values import ARROW, format_duration
 
 if TYPE_CHECKING:
@@ -28,10 +29,8 @@ if TYPE_CHECKING:
     from msgflow.sql.header import Header
     from msgflow.sql.value import Value
 
-_PIECES = 5
 # The query whose paths are explained.
 _FIRST = "e2e-latency"
-_SAMPLED = "SELECT 1 FROM main.stack_sample WHERE run_id = ? LIMIT 1"
 # By what a culprit lacks: how to know what is not known of it.
 _RECORDED_BY = {
     "kernel": "msgflow record --kernel shows what had the CPU",
@@ -39,14 +38,6 @@ _RECORDED_BY = {
 }
 # What a path has in place of a topic without a name.
 _UNNAMED = "?"
-# Rows of an explanation: what its callbacks waited for, what was lost on the way, and the paths.
-_OF_PATH = "FROM result WHERE path = $path"
-_OWN_WAITS = "FROM result WHERE list_contains($callbacks, [node, callback]) LIMIT 3"
-_OWN_LOSSES = (
-    f"FROM result WHERE list_contains($places, coalesce(topic_name, '{_UNNAMED}'))"
-    " AND list_contains($places, subscriber) AND dropped + lost > 0"
-)
-_WORST_FIRST = "FROM result ORDER BY path <> $path, p95_ns DESC NULLS LAST, path"
 
 
 @dataclass(frozen=True)
@@ -107,16 +98,9 @@ class _Questions:
     run: Run
     place: str | None
 
-    @property
-    def ends(self) -> dict[str, Value]:
-        """The parameter of queries of paths that chooses where flows end."""
-        return {} if self.place is None else {"to": self.place}
-
     def explanation(self, asked: Slice) -> Explanation:
         """Ask all that an explanation consists of."""
-        skipped, paths = self.paths(asked)
-        since = ["--start", skipped] if skipped else []
-        times = replace(asked, start=skipped) if skipped else asked
+        times, paths = self.paths(asked)
         values: dict[str, Any] = {
             "runs": [self.run.run_id],
             **times.window([self.run]).bindings,
@@ -125,38 +109,52 @@ class _Questions:
         }
         self.steps.keep("ready_wait", values)
         waits = self.ask("waits-pair", times)
-        parts = self.ask("path-breakdown", times, **self.ends)
+        parts = self.ask("path-breakdown", times, to=self.place)
         # What is lost while a system warms up is lost.
         losses = self.ask("topics-delivery", asked)
-        verdict = self.verdict(values, paths, parts, losses)
-        path = _worst(verdict, paths)
-        shown = [path] if self.place is None else paths.table["path"].to_pylist()
-        flow = self.ask("critical-path", times, **self.ends, via=[path], quantile="p95")
-        paths = self.rows(_WORST_FIRST, paths, path=path)
-        parts = self.rows(_OF_PATH, parts, path=path)
-        losses = self.rows(_OWN_LOSSES, losses, places=path.split(ARROW))
-        callbacks = [[row["node"], row["what"]] for row in parts.table.to_pylist()]
-        kept = self.internal("kept_input", {**values, "paths": shown})
-        functions = self.functions({**values, "callbacks": callbacks})
+        tables = {"path_row": paths.table, "breakdown": parts.table, "delivery": losses.table}
+        with registered(self.connection, **tables):
+            for name in ("open_end", "why_callback", "suspect"):
+                self.steps.keep(name, values)
+            verdict = internal_sql().run(self.connection, "verdict", values).to_arrow_table()
+        values["path"] = path = _worst(verdict, paths)
+        values["paths"] = [path] if self.place is None else paths.table["path"].to_pylist()
+        flow = self.ask("critical-path", times, to=self.place, via=[path], quantile="p95")
+        paths = self.rows("worst_first", paths, values)
+        parts = self.rows("path_part", parts, values)
+        losses = self.rows("own_loss", losses, values)
+        values["callbacks"] = [[row["node"], row["what"]] for row in parts.table.to_pylist()]
+        with registered(self.connection, piece=flow.table):
+            names = ("kept_input", "piece_to_ask", "callback_function")
+            kept, pieces, functions = (self.internal(name, values) for name in names)
+        since = ["--start", str(times.start)] if times != asked else []
+        shown: list[tuple[Header, Sequence[Mapping[str, Any]], Sequence[str]]] = [
+            (kind_of("dead_end"), kept, ()),
+            (kind_of("topic_unnamed"), [values] if _UNNAMED in path.split(ARROW) else [], ()),
+            (internal_sql().header("piece_to_ask"), pieces, since),
+            (load_query("critical-path"), flow.table.to_pylist()[:1], ()),
+            (load_query("topics-delivery"), losses.table.to_pylist(), ()),
+            (internal_sql().header("callback_function"), functions, since),
+        ]
+        steps = [
+            (*words, *more)
+            for header, rows, more in shown
+            for row in rows
+            if (words := header.next_command(row))
+        ]
+        lacking = set(chain(*verdict["lacks"].to_pylist()))
         notes = [
-            *_to_record(verdict),
-            *_without(skipped),
+            *(cure for word, cure in _RECORDED_BY.items() if word in lacking),
+            *(
+                f"without the first {start.removesuffix('s')} s, a warm-up: the longest latencies"
+                " lie there (--start 0s reads them, too)"
+                for start in since[1:]
+            ),
             *(row["detail"] for row in kept),
             *_outlier(self.run, paths.table.to_pylist()[0]),
             *paths.notes,
             *flow.notes,
             *_computing(functions),
-        ]
-        with registered(self.connection, piece=flow.table):
-            pieces = self.internal("piece_to_ask", {})
-        unnamed = [{}] if _UNNAMED in path.split(ARROW) else []
-        steps = [
-            *_next(kind_of("dead_end"), kept),
-            *_next(kind_of("topic_unnamed"), unnamed),
-            *_next(internal_sql().header("piece_to_ask"), pieces, since),
-            *_next(load_query("critical-path"), flow.table.to_pylist()[:1]),
-            *_next(load_query("topics-delivery"), losses.table.to_pylist()),
-            *_next(internal_sql().header("callback_function"), functions[:1], since),
         ]
         return Explanation(
             run=self.run,
@@ -164,92 +162,72 @@ class _Questions:
             place=self.place,
             verdict=replace(paths, table=verdict, header=None, notes=[], path_numbers={}),
             paths=paths,
-            nodes=self.rows(internal_sql().text("node_share"), parts, "breakdown", path=path),
-            slow_flow=self.rows(
-                internal_sql().text("longest_piece"), flow, "slow_flow", count=_PIECES
-            ),
-            waits=self.rows(_OWN_WAITS, waits, callbacks=callbacks),
+            nodes=self.rows("node_share", parts, values),
+            slow_flow=self.rows("longest_piece", flow, values),
+            waits=self.rows("own_wait", waits, values),
             losses=losses,
             steps=tuple(dict.fromkeys(steps)),
             notes=tuple(dict.fromkeys(notes)),
         )
 
+    def paths(self, asked: Slice) -> tuple[Slice, QueryResult]:
+        """Return the paths, and the times that are read of them: a warm-up is left out."""
+        times, paths = asked, self.ask(_FIRST, asked, to=self.place)
+        if not _has_flows(paths):
+            raise self.nothing(asked)
+        # Of the flows that were read, as `compare` finds it.
+        ((last_ns,),) = internal_sql().run(self.connection, "warm_up", {}).fetchall()
+        if asked.start is None and last_ns is not None:
+            later = replace(
+                asked, start=f"{warm_up_seconds(last_ns - (self.run.start_ns or 0)):g}s"
+            )
+            # It ends with a step, which may lie behind all that was asked for or recorded.
+            if later.window([self.run]).start_ns < asked.window([self.run]).end_ns:
+                warm = self.ask(_FIRST, later, to=self.place)
+                if _has_flows(warm):
+                    times, paths = later, warm
+        # Only its paths have to be told apart.
+        known = ["named_path"] if self.place is None else []
+        return times, with_path_numbers(self.connection, paths, *known)
+
     def ask(self, name: str, times: Slice, **given: Value) -> QueryResult:
         """Return the answer of a named query; its steps stay for the next one."""
-        # The first one has looked for the places that are asked for; others are of its paths.
-        header, is_first = load_query(name), name == _FIRST
         return run_query(
             self.connection,
-            header,
+            load_query(name),
             given,
             times,
             steps=self.steps,
             runs=(self.run,),
-            is_known=not is_first,
+            # The first one looks for the places that are asked for; others are of its paths.
+            is_known=name != _FIRST,
         )
 
-    def paths(self, asked: Slice) -> tuple[str | None, QueryResult]:
-        """Return the paths without a warm-up, and when that is over; None: it is not left out."""
-        paths = self.ask(_FIRST, asked, **self.ends)
-        if not _has_flows(paths):
-            raise self.nothing(asked)
-        skipped = None
-        # Of the flows that were read, as `compare` finds it.
-        ((last_ns,),) = internal_sql().run(self.connection, "warm_up", {}).fetchall()
-        if asked.start is None and last_ns is not None:
-            start_ns = self.run.start_ns or 0
-            seconds = warm_up_seconds(last_ns - start_ns)
-            # It ends with a step, which may lie behind all that was asked for.
-            if start_ns + seconds * 1e9 < asked.window([self.run]).end_ns:
-                later = self.ask(_FIRST, replace(asked, start=f"{seconds:g}s"), **self.ends)
-                # A recording may be shorter than the steps in which it is left out.
-                if _has_flows(later):
-                    skipped, paths = f"{seconds:g}s", later
-        # Only paths have to be told apart.
-        known = [] if self.ends else ["named_path"]
-        return skipped, with_path_numbers(self.connection, paths, *known)
-
-    def verdict(
-        self, values: Mapping[str, Any], paths: QueryResult, parts: QueryResult, losses: QueryResult
-    ) -> pa.Table:
-        """Return the sentences about culprits."""
-        tables = {"path_row": paths.table, "breakdown": parts.table, "delivery": losses.table}
-        with registered(self.connection, **tables):
-            for name in ("open_end", "why_callback", "suspect"):
-                self.steps.keep(name, values)
-            return internal_sql().run(self.connection, "verdict", values).to_arrow_table()
-
-    def functions(self, values: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Return in which functions the callback was that computes most, where samples are."""
-        run_id = self.run.run_id
-        if not self.connection.execute(_SAMPLED, [run_id]).fetchall():
-            return []
-        return self.internal("callback_function", {"run_id": run_id, **values})
-
     def internal(self, name: str, values: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Return the rows of a statement of `schema/internal`."""
+        """Return the rows of a statement of `schema/internal`, none if it has nothing to read."""
+        if not may_have_rows(self.connection, internal_sql().header(name).sources, values):
+            return []
         return list(internal_sql().rows(self.connection, name, values))
 
-    def rows(self, sql: str, of: QueryResult, name: str = "result", **values: Any) -> QueryResult:
-        """Return a result with the rows of a query on it, which reads it by this name."""
-        with registered(self.connection, **{name: of.table}):
-            return replace(of, table=self.connection.sql(sql, params=values).to_arrow_table())
+    def rows(self, name: str, of: QueryResult, values: Mapping[str, Any]) -> QueryResult:
+        """Return a result with the rows of a statement, which reads its table."""
+        (table,) = internal_sql().header(name).reads
+        with registered(self.connection, **{table: of.table}):
+            rows = internal_sql().run(self.connection, name, values).to_arrow_table()
+        return replace(of, table=rows)
 
     def nothing(self, asked: Slice) -> NoFlowError:
         """Return what to say where no flow ends at a place: flows may begin there or pass."""
-        if self.place is None:
-            message = "no flow arrives at the end of a path"
-        elif any(
-            fnmatchcase(step.strip("()"), self.place)
-            for path in self.ask(_FIRST, asked).table["path"].to_pylist()
-            for step in path.split(ARROW)
-        ):
-            return NoFlowError(
-                f"flows begin there or pass, none ends — {self.place}",
-                shlex.join(["msgflow", "query", _FIRST, "--via", self.place]),
-            )
-        else:
+        message = "no flow arrives at the end of a path"
+        if self.place is not None:
             message = f"no flow arrives — {self.place}"
+            paths = self.ask(_FIRST, asked).table["path"].to_pylist()
+            steps = {step.strip("()") for path in paths for step in path.split(ARROW)}
+            if fnmatch.filter(steps, self.place):
+                return NoFlowError(
+                    f"flows begin there or pass, none ends — {self.place}",
+                    shlex.join(["msgflow", "query", _FIRST, "--via", self.place]),
+                )
         return NoFlowError(message, "msgflow check says where flows break off")
 
 
@@ -259,37 +237,8 @@ def _has_flows(paths: QueryResult) -> bool:
 
 def _worst(verdict: pa.Table, paths: QueryResult) -> str:
     """Return the path that the worst culprit delays, else the one that is slowest as a rule."""
-    for path in verdict["path"].to_pylist():
-        if path is not None:
-            return str(path)
     slowest = max(paths.table.to_pylist(), key=lambda row: row["p95_ns"] or 0)
-    return str(slowest["path"])
-
-
-def _next(
-    header: Header, rows: Iterable[Mapping[str, Any]], more: Sequence[str] = ()
-) -> Iterator[tuple[str, ...]]:
-    """Yield the commands that show more of rows, as words behind `msgflow`."""
-    for row in rows:
-        if words := header.next_command(row):
-            yield (*words, *more)
-
-
-def _to_record(verdict: pa.Table) -> Iterator[str]:
-    """Yield how to know what is not known of culprits."""
-    lacking = {word for words in verdict["lacks"].to_pylist() for word in words}
-    for word, cure in _RECORDED_BY.items():
-        if word in lacking:
-            yield cure
-
-
-def _without(skipped: str | None) -> Iterator[str]:
-    """Yield what was left out."""
-    if skipped:
-        yield (
-            f"without the first {skipped.removesuffix('s')} s, a warm-up: the longest latencies lie"
-            " there (--start 0s reads them, too)"
-        )
+    return str(next(filter(None, verdict["path"].to_pylist()), slowest["path"]))
 
 
 def _outlier(run: Run, path: Mapping[str, Any]) -> Iterator[str]:
