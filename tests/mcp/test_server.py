@@ -307,8 +307,8 @@ def test_names_of_a_stranger_make_no_long_answers(small_database: Path, tmp_path
     with duckdb.connect(str(forged)) as con:
         con.execute("UPDATE store.run SET name = repeat('n', 100_000)")
         con.execute(
-            "INSERT INTO store.finding SELECT run_id, NULL, 'lost_packets', repeat('s', 30_000), 1,"
-            " NULL FROM store.run"
+            "INSERT INTO store.finding (run_id, name, subject, count)"
+            " SELECT run_id, 'lost_packets', repeat('s', 30_000), 1 FROM store.run"
         )
     long = "q" * 100_000
     answers = ask_here(forged, ("info", {}), ("check", {}), ("run_query", {"name": long}))
