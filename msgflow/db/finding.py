@@ -25,10 +25,9 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from msgflow.db.store_table import store_tables
-from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header
 from msgflow.sql.quoting import literal
-from msgflow.sql.statement import Statements, with_rows
+from msgflow.sql.statement import health_sql, with_rows
 
 if TYPE_CHECKING:
     import duckdb
@@ -76,7 +75,7 @@ class Finding:
 @cache
 def kinds() -> tuple[Header, ...]:
     """Return the headers of all kinds of findings, sorted by name."""
-    headers = (_statements().header(name) for name in _statements().names())
+    headers = (health_sql().header(name) for name in health_sql().names())
     return tuple(header for header in headers if header.kind != "inline")
 
 
@@ -98,11 +97,6 @@ def kinds_with_rows(
     return [
         kind for kind in kinds_of(phase) if not kind.sources or filled.intersection(kind.sources)
     ]
-
-
-def kind_of(name: str) -> Header:
-    """Return the header of a kind of finding."""
-    return _statements().header(name)
 
 
 def phase_of(header: Header) -> str:
@@ -130,7 +124,7 @@ def composed(layer: str) -> tuple[Header, ...]:
         body = f"SELECT {_OF_KIND}\nFROM (\nVALUES\n{rows}\n) AS kind ({_OF_KIND})\n"
     else:
         return ()
-    path = _statements().directory
+    path = health_sql().directory
     return (Header(name, name, description, grain, "view", body, path),)
 
 
@@ -145,7 +139,7 @@ def statement(headers: Sequence[Header]) -> str:
     return "\nUNION ALL\n".join(
         f"SELECT * REPLACE ('{short_name(header)}' AS name, count::BIGINT AS count)\n"
         f"FROM (\nSELECT {no_row} WHERE false\n"
-        f"UNION ALL BY NAME (\n{_statements().text(short_name(header))})\n)"
+        f"UNION ALL BY NAME (\n{health_sql().text(short_name(header))})\n)"
         for header in headers
     )
 
@@ -191,7 +185,7 @@ def next_command(findings: Sequence[Finding]) -> str:
 
 def commands_after(findings: Sequence[Finding]) -> list[tuple[str, ...]]:
     """Return the commands that a reader of the findings runs next; the last one is `why`."""
-    after = (kind_of(each.name).next_command(asdict(each)) for each in findings)
+    after = (health_sql().header(each.name).next_command(asdict(each)) for each in findings)
     return [*dict.fromkeys(words for words in after if words), ("why",)]
 
 
@@ -248,8 +242,3 @@ def _rows(headers: Iterable[Header]) -> str:
         for each in headers
     )  # fmt: skip
     return ",\n".join(f"    ({', '.join(literal(text or '') for text in row)})" for row in rows)
-
-
-@cache
-def _statements() -> Statements:
-    return Statements(resource_directory("schema") / "health")

@@ -9,14 +9,19 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-from msgflow.db.finding import kind_of
 from msgflow.errors import NoFlowError
 from msgflow.files.resources import resource_directory
 from msgflow.query.catalogue import load_query
 from msgflow.query.compare import warm_up_seconds
 from msgflow.query.names import with_path_numbers
 from msgflow.query.runner import Steps, run_query
-from msgflow.sql.statement import Statements, internal_sql, may_have_rows, registered
+from msgflow.sql.statement import (
+    Statements,
+    health_sql,
+    internal_sql,
+    may_have_rows,
+    registered,
+)
 from msgflow.text.values import ARROW, format_duration
 
 if TYPE_CHECKING:
@@ -129,8 +134,12 @@ class _Questions:
             kept, pieces, functions = (self.internal(name, values) for name in names)
         since = ["--start", str(times.start)] if times != asked else []
         shown: list[tuple[Header, Sequence[Mapping[str, Any]], Sequence[str]]] = [
-            (kind_of("dead_end"), kept, ()),
-            (kind_of("topic_unnamed"), [values] if _UNNAMED in path.split(ARROW) else [], ()),
+            (health_sql().header("dead_end"), kept, ()),
+            (
+                health_sql().header("topic_unnamed"),
+                [values] if _UNNAMED in path.split(ARROW) else [],
+                (),
+            ),
             (internal_sql().header("piece_to_ask"), pieces, since),
             (load_query("critical-path"), flow.table.to_pylist()[:1], ()),
             (load_query("topics-delivery"), losses.table.to_pylist(), ()),
