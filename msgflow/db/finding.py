@@ -49,13 +49,20 @@ class Finding:
         phase: what it is about: 'input', 'recording' or 'database'.
         severity: 'error' where results are wrong or missing, 'warning' where they may be, or
             'info'.
-        subject: where: a trace, process, host, topic.
+        subject: where, in words: a trace, process, host, node, topic.
         count: how often.
         detail: numbers.
         cause: where it comes from, as a rule.
         cure: what to do about it.
         title: what was found.
         description: what it means for results.
+        host_id: the host, also of a process; None: not one host alone.
+        process_id: the process, also of a thread or node.
+        thread_id: the thread.
+        node_id: the node; of two that a topic joins, the one that subscribes.
+        publishing_node_id: of two nodes, the one that publishes.
+        topic_name: the topic.
+        layer: kind of event that is missing, such as 'requests'.
     """
 
     run_id: int
@@ -70,6 +77,13 @@ class Finding:
     cure: str
     title: str
     description: str
+    host_id: int | None = None
+    process_id: int | None = None
+    thread_id: int | None = None
+    node_id: int | None = None
+    publishing_node_id: int | None = None
+    topic_name: str | None = None
+    layer: str | None = None
 
 
 @cache
