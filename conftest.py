@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import lzma
 import shutil
 import signal
 import sys
@@ -153,6 +154,18 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         return made_once(tmp_path_factory, f"{system}_{factor}", make)
 
     return database
+
+
+@pytest.fixture
+def older_database(tmp_path: Path) -> Path:
+    """A database whose tables another version of msgflow made.
+
+    It is that of `examples/pipeline.tar.xz`, without its views.
+    """
+    path = tmp_path / "older.duckdb"
+    stored = ROOT / "tests" / "support" / "older_tables.duckdb.xz"
+    path.write_bytes(lzma.decompress(stored.read_bytes()))
+    return path
 
 
 @pytest.fixture

@@ -15,10 +15,9 @@ version of msgflow may change these. Table macros are no tables: call them throu
 (`func.flow_forward(…).table_valued(…)`).
 
 Each table and column has its meaning as `comment`. A column has its unit as `info["unit"]`, and a
-moment the column that leads to its clock as `info["clock"]`; `msgflow.db.tables.column` lists all
-keys. A `ForeignKey` is a relation, by which `join` finds its condition. The database does not have
-these constraints, nor the primary keys of views. Create databases with `msgflow ingest`, not with
-`create_all`.
+moment the column that leads to its clock as `info["clock"]`. A `ForeignKey` is a relation, by which
+`join` finds its condition. The database does not have these constraints, nor the primary keys of
+views. Create databases with `msgflow ingest`, not with `create_all`.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ from duckdb_engine.datatypes import UBigInteger
 from sqlalchemy import ARRAY, Column, ForeignKey, MetaData, Table
 
 from msgflow.db import objects
-from msgflow.db.tables import STORE
+from msgflow.db.store_table import StoreColumn, store_tables
 
 if TYPE_CHECKING:
     from sqlalchemy.types import TypeEngine
@@ -39,6 +38,17 @@ if TYPE_CHECKING:
     from msgflow.sql.header import Column as HeaderColumn
 
 __all__ = ["public", "store"]
+
+
+def _store() -> MetaData:
+    metadata = MetaData(schema="store")
+    for table in store_tables().values():
+        columns = (
+            _column(each, each, [f"store.{each.to}.{each.to}_id"] if each.to else [], each.is_key)
+            for each in table.columns.values()
+        )
+        Table(table.name, metadata, *columns, comment=table.grain)
+    return metadata
 
 
 def _public() -> MetaData:
@@ -55,34 +65,41 @@ def _public() -> MetaData:
         if each.name == f"{view}_id"
     }
     for view, header in views.items():
-        columns = [_column(view, described, keys) for described in header.columns]
+        stored = store_tables().get(view)
+        origins = {} if stored is None else stored.columns
+        columns = (
+            _column(
+                each,
+                origins.get(each.name),
+                _relation(view, each.name, origins.get(each.name), keys),
+                each.name == f"{view}_id",
+            )
+            for each in header.columns
+        )
         Table(view, metadata, *columns, comment=f"{header.description} {header.grain}")
     return metadata
 
 
-def _column(view: str, described: HeaderColumn, keys: Collection[str]) -> Column[Any]:
-    stored = STORE.tables.get(f"store.{view}")
-    origin = None if stored is None else stored.columns.get(described.name)
-    unit = described.unit
+def _column(
+    described: HeaderColumn, origin: StoreColumn | None, to: Collection[str], is_key: bool
+) -> Column[Any]:
+    unit, clock = described.unit, origin and origin.clock
     return Column(
         described.name,
         _type(described.type),
-        *_relation(view, described.name, origin, keys),
-        primary_key=described.name == f"{view}_id",
+        *map(ForeignKey, to),
+        primary_key=is_key,
         comment=described.description + (f" [{unit}]" if unit else ""),
-        info=dict(origin.info) if origin is not None else {"unit": unit} if unit else {},
+        info={key: value for key, value in (("unit", unit), ("clock", clock)) if value},
     )
 
 
-def _relation(
-    view: str, name: str, origin: Column[Any] | None, keys: Collection[str]
-) -> list[ForeignKey]:
+def _relation(view: str, name: str, origin: StoreColumn | None, keys: Collection[str]) -> list[str]:
     """Return the relation that the table of the view declares, else the one that the name says."""
-    declared = [] if origin is None else [key.column for key in origin.foreign_keys]
-    if declared:
-        return [ForeignKey(f"{declared[0].table.name}.{declared[0].name}")]
+    if origin is not None and origin.to:
+        return [f"{origin.to}.{origin.to}_id"]
     if name in keys and name != f"{view}_id":
-        return [ForeignKey(f"{name.removesuffix('_id')}.{name}")]
+        return [f"{name.removesuffix('_id')}.{name}"]
     return []
 
 
@@ -92,5 +109,5 @@ def _type(name: str) -> TypeEngine[Any]:
     return ARRAY(declared, dimensions=dimensions) if dimensions else declared
 
 
-store = STORE
+store = _store()
 public = _public()

@@ -60,6 +60,7 @@
 --     pieces, hop, part, thread, wakers, priority, who_priority, latency_ns (heading),
 --     take_id (heading), is_ambiguous (heading), path (heading)
 -- note: clocks
+-- next: flow --take {take_id} --why
 CREATE OR REPLACE TEMP TABLE critical_flow AS
 WITH path AS (
     SELECT path_id

@@ -39,7 +39,7 @@
 -- column: max_root_ns BIGINT [epoch ns]  When the flow with the longest latency began
 -- column: max_take_id BIGINT       Take at its end: msgflow flow --take
 -- column: sink_event, is_cut
--- column: reasons VARCHAR          Why roots did not reach the end of the path, with counts
+-- column: reasons MAP(VARCHAR, BIGINT)  Why roots did not reach the end of the path, and how many
 -- column: path
 -- brief: path, median_ns, p99_ns, max_ns, reached, lost, ambiguous, loss_affected, dropped,
 --     roots (even 0), p95_ns, superseded, no_output, reasons, not_connected, unknown,
@@ -97,7 +97,7 @@ completeness AS (
         path_id,
         count(*) FILTER (is_first IS NOT false) AS roots,
         histogram(status) FILTER (is_first IS NOT false)::MAP(VARCHAR, BIGINT) AS number,
-        main.counts_text(CASE WHEN status <> 'reached' THEN reason END) AS reasons,
+        main.word_counts(CASE WHEN status <> 'reached' THEN reason END) AS reasons,
         count(DISTINCT (root_kind, root_id)) FILTER (is_loss_affected) AS loss_affected
     FROM flow
     GROUP BY path_id

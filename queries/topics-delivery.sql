@@ -20,12 +20,13 @@
 -- column: delivered_percent DOUBLE [%]  Share delivered, of those delivered, dropped or lost
 -- column: lost_percent DOUBLE [%]   Share lost, of the same
 -- column: orphans BIGINT            Takes in the time window whose publication is not known
--- column: reasons VARCHAR           Why messages were not taken, with counts
--- column: orphan_reasons VARCHAR    Why publications are not known, with counts
+-- column: reasons MAP(VARCHAR, BIGINT)  Why messages were not taken, and how many
+-- column: orphan_reasons MAP(VARCHAR, BIGINT)  Why publications are not known, and how many
 -- column: subscription_id, is_internal
 -- brief: topic_name, subscriber, delivered (even 0), dropped (even 0), lost (even 0), reasons,
 --     not_connected, unknown (even 0), delivered_percent, lost_percent, published,
 --     cut_by_recording, orphans, orphan_reasons
+-- next: query topics --measure unmatched --topic {topic_name} | query topics --measure unmatched
 WITH delivery AS (
     SELECT
         d.subscription_id, count(*) AS published,
@@ -35,7 +36,7 @@ WITH delivery AS (
         count(*) FILTER (WHERE d.status = 'not_connected') AS not_connected,
         count(*) FILTER (WHERE d.status = 'cut_by_recording') AS cut_by_recording,
         count(*) FILTER (WHERE d.status = 'unknown') AS unknown,
-        main.counts_text(d.reason) AS reasons
+        main.word_counts(d.reason) AS reasons
     FROM main.stat_delivery AS d
     JOIN main.publication AS b ON d.publication_id = b.publication_id
     WHERE list_contains($runs, d.run_id) AND b.start_ns >= $start_ns AND b.start_ns < $end_ns
@@ -43,7 +44,7 @@ WITH delivery AS (
 ),
 orphan AS (
     SELECT
-        o.subscription_id, count(*) AS orphans, main.counts_text(o.reason) AS orphan_reasons
+        o.subscription_id, count(*) AS orphans, main.word_counts(o.reason) AS orphan_reasons
     FROM main.stat_orphan AS o
     JOIN main.take AS t ON o.take_id = t.take_id
     WHERE list_contains($runs, o.run_id) AND t.taken_ns >= $start_ns AND t.taken_ns < $end_ns

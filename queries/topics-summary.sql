@@ -15,7 +15,7 @@
 -- column: not_connected BIGINT        Those while the two were not connected
 -- column: cut_by_recording BIGINT     Those that the end of the recording left untaken
 -- column: unknown BIGINT              Those with an unknown fate
--- column: reasons VARCHAR             Why messages were not taken, with counts
+-- column: reasons MAP(VARCHAR, BIGINT)  Why messages were not taken, and how many
 -- column: latency_median_ns BIGINT [ns]  Median latency from publication to take
 -- column: latency_p95_ns BIGINT [ns]  95 % of the latencies are at most this
 -- column: latency_max_ns BIGINT [ns]  Longest latency
@@ -56,7 +56,7 @@ jitter AS (
 delivery AS (
     SELECT
         s.run_id, s.topic_name, histogram(d.status)::MAP(VARCHAR, BIGINT) AS number,
-        main.counts_text(d.reason) AS reasons
+        main.word_counts(d.reason) AS reasons
     FROM main.stat_delivery AS d
     JOIN main.publication AS b ON d.publication_id = b.publication_id
     JOIN main.subscription AS s ON d.subscription_id = s.subscription_id

@@ -86,8 +86,9 @@ CREATE TABLE staging.executor_named (event_id BIGINT, process_id BIGINT, executo
 CREATE TABLE staging.executor_thread (executor_id BIGINT, thread_id BIGINT);
 CREATE TABLE staging.failed_take (trace_id INTEGER, subscription_id BIGINT, process_id BIGINT,
     thread_id BIGINT, failed_ns BIGINT);
-CREATE TABLE staging.finding (run_id BIGINT, trace_id BIGINT, name VARCHAR, subject VARCHAR,
-    count BIGINT, detail VARCHAR);
+CREATE TABLE staging.finding (run_id BIGINT, trace_id BIGINT, name VARCHAR, host_id BIGINT,
+    process_id BIGINT, thread_id BIGINT, node_id BIGINT, publishing_node_id BIGINT,
+    topic_name VARCHAR, layer VARCHAR, subject VARCHAR, count BIGINT, detail VARCHAR);
 CREATE TABLE staging.gap (trace_id INTEGER, cpu INTEGER, kind VARCHAR, start_ns BIGINT,
     end_ns BIGINT, event_count BIGINT, recording_index INTEGER, cpu_id INTEGER,
     covered_until_ns BIGINT, any_covered_until_ns BIGINT);

@@ -89,8 +89,8 @@ def command(
         # Most commands explain one run: what is worst comes first, else what is newest.
         shown = [one.run_id for one in chosen]
         about = next((each.run_id for each in findings if each.run_id in shown), shown[-1])
-        for step in commands_after([each for each in findings if each.run_id == about]):
-            print_next(step.split(), database.path, None if run is None else about)
+        for words in commands_after([each for each in findings if each.run_id == about]):
+            print_next(["msgflow", *words], database.path, None if run is None else about)
     if any(finding.severity == "error" for finding in findings):
         raise typer.Exit(ExitCode.FAILED)
 

@@ -24,6 +24,9 @@ from msgflow.files.resources import resource_directory
 from msgflow.sql.failure import database_errors
 from msgflow.sql.quoting import literal
 
+# What to do about tables that no revision upgrades, as those of before the first release.
+INGEST_AGAIN = "msgflow ingest TRACE --db NEW.duckdb reads the recording again"
+
 
 def connect(
     path: Path, *, read_only: bool, memory_limit: str | None = None
@@ -129,7 +132,7 @@ def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:
     if revision.isdecimal():
         raise DatabaseError(
             f"database has schema revision {revision[:40]}, from before the first release — {path}",
-            "msgflow ingest TRACE --db NEW.duckdb reads the recording again",
+            INGEST_AGAIN,
         )
     if revision not in known_revisions():
         raise DatabaseError(
@@ -173,10 +176,10 @@ def _require(found: Mapping[str, str], wanted: Mapping[str, str], path: Path) ->
     # An upgrade makes views and macros anew, but not the rest.
     can_upgrade = name.startswith(("view", "macro"))
     raise DatabaseError(
-        f"the database is not as msgflow makes it: it {how} {name} — {path}",
+        f"the database is not as this msgflow makes it: it {how} {name} — {path}",
         f"msgflow db upgrade --db {shlex.quote(str(path))} makes views and macros anew"
         if can_upgrade
-        else "ingest the traces into a new file",
+        else INGEST_AGAIN,
     )
 
 

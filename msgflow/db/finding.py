@@ -10,47 +10,32 @@ phase, which decides when the query runs and what it reads:
 | recording | whenever links or clocks of a run change | `store`, `derive`, `main` |
 | database | for `msgflow check --detail` | `store` |
 
-A query returns `count` and `detail`, and where it applies `subject` (the place, in words) and
-`trace_id`; those that do not read `staging` return `run_id` too, and may use `$run_id`. The rows of
-the first two phases are stored in `store.finding`. The view `main.finding` adds what the headers
-say. The phase database is about msgflow itself: no ingest looks for what it can find.
+A query returns columns of the table `store.finding`: `count` and `detail`, the place as a column
+(`node_id`, `topic_name`), else in words (`subject`); those that do not read `staging` return
+`run_id` too, and may use `$run_id`. The rows of the first two phases are stored in that table. The
+view `main.finding` adds what the headers say. The phase database is about msgflow itself: no ingest
+looks for what it can find.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from msgflow.db.store_table import store_tables
-from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header
 from msgflow.sql.quoting import literal
-from msgflow.sql.statement import Statements, with_rows
+from msgflow.sql.statement import health_sql, with_rows
 
 if TYPE_CHECKING:
     import duckdb
 
 SEVERITIES = ("error", "warning", "info")
 
-# Gives the columns that a query may leave out, and the types of all.
-_NO_ROW = (
-    "SELECT NULL::BIGINT AS run_id, NULL::BIGINT AS trace_id, NULL::VARCHAR AS subject, "
-    "NULL::BIGINT AS count, NULL::VARCHAR AS detail WHERE false"
-)
-
 # What the header of a kind says of each of its findings.
 _OF_KIND = "name, phase, severity, title, description, cause, cure"
-
-# By the name of a finding: what shows more of it, or cures it.
-_AFTER = {
-    "dead_end": "msgflow suggest links",
-    "topic_unnamed": "msgflow suggest links",
-    "unmatched_take": "msgflow query topics --measure unmatched",
-    "process_without_rclcpp": "msgflow query path-breakdown",
-    "clock_not_synchronised": "msgflow clocks",
-}
 
 
 @dataclass(frozen=True)
@@ -64,13 +49,20 @@ class Finding:
         phase: what it is about: 'input', 'recording' or 'database'.
         severity: 'error' where results are wrong or missing, 'warning' where they may be, or
             'info'.
-        subject: where: a trace, process, host, topic.
+        subject: where, in words: a trace, process, host, node, topic.
         count: how often.
         detail: numbers.
         cause: where it comes from, as a rule.
         cure: what to do about it.
         title: what was found.
         description: what it means for results.
+        host_id: the host, also of a process; None: not one host alone.
+        process_id: the process, also of a thread or node.
+        thread_id: the thread.
+        node_id: the node; of two that a topic joins, the one that subscribes.
+        publishing_node_id: of two nodes, the one that publishes.
+        topic_name: the topic.
+        layer: kind of event that is missing, such as 'requests'.
     """
 
     run_id: int
@@ -85,12 +77,19 @@ class Finding:
     cure: str
     title: str
     description: str
+    host_id: int | None = None
+    process_id: int | None = None
+    thread_id: int | None = None
+    node_id: int | None = None
+    publishing_node_id: int | None = None
+    topic_name: str | None = None
+    layer: str | None = None
 
 
 @cache
 def kinds() -> tuple[Header, ...]:
     """Return the headers of all kinds of findings, sorted by name."""
-    headers = (_statements().header(name) for name in _statements().names())
+    headers = (health_sql().header(name) for name in health_sql().names())
     return tuple(header for header in headers if header.kind != "inline")
 
 
@@ -139,7 +138,7 @@ def composed(layer: str) -> tuple[Header, ...]:
         body = f"SELECT {_OF_KIND}\nFROM (\nVALUES\n{rows}\n) AS kind ({_OF_KIND})\n"
     else:
         return ()
-    path = _statements().directory
+    path = health_sql().directory
     return (Header(name, name, description, grain, "view", body, path),)
 
 
@@ -148,10 +147,13 @@ def statement(headers: Sequence[Header]) -> str:
 
     `run_id` is NULL in those of the phase input.
     """
+    # Gives the columns that a query may leave out, and the types of all.
+    columns = store_tables()["finding"].columns.values()
+    no_row = ", ".join(f"NULL::{column.type} AS {column.name}" for column in columns)
     return "\nUNION ALL\n".join(
-        f"SELECT run_id, trace_id, '{short_name(header)}' AS name, subject, "
-        "count::BIGINT AS count, detail\n"
-        f"FROM (\n{_NO_ROW}\nUNION ALL BY NAME (\n{_statements().text(short_name(header))})\n)"
+        f"SELECT * REPLACE ('{short_name(header)}' AS name, count::BIGINT AS count)\n"
+        f"FROM (\nSELECT {no_row} WHERE false\n"
+        f"UNION ALL BY NAME (\n{health_sql().text(short_name(header))})\n)"
         for header in headers
     )
 
@@ -195,11 +197,10 @@ def next_command(findings: Sequence[Finding]) -> str:
     return "msgflow why" if is_sound else "msgflow check"
 
 
-def commands_after(findings: Sequence[Finding]) -> list[str]:
+def commands_after(findings: Sequence[Finding]) -> list[tuple[str, ...]]:
     """Return the commands that a reader of the findings runs next; the last one is `why`."""
-    names = {finding.name for finding in findings}
-    after = dict.fromkeys(command for name, command in _AFTER.items() if name in names)
-    return [*after, "msgflow why"]
+    after = (health_sql().header(each.name).next_command(asdict(each)) for each in findings)
+    return [*dict.fromkeys(words for words in after if words), ("why",)]
 
 
 def broken_rules(con: duckdb.DuckDBPyConnection, run_id: int | None = None) -> list[Finding]:
@@ -255,8 +256,3 @@ def _rows(headers: Iterable[Header]) -> str:
         for each in headers
     )  # fmt: skip
     return ",\n".join(f"    ({', '.join(literal(text or '') for text in row)})" for row in rows)
-
-
-@cache
-def _statements() -> Statements:
-    return Statements(resource_directory("schema") / "health")

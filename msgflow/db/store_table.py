@@ -1,7 +1,7 @@
-"""Tables of the schema `store`, as `schema/store.sql` describes them, and their public views.
+"""Tables of the schema `store`, as `schema/store.sql` defines them, and their public views.
 
-The file is rendered from `tables`, whose definitions need SQLAlchemy: that takes longer to import
-than a small ingest takes to run. The top of the file says how it is written.
+The top of that file says how it is written. `msgflow.schema` makes tables of SQLAlchemy of them,
+which takes longer to import than a small ingest takes to run.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ class StoreColumn(Column):
     """A column of a table."""
 
     is_required: bool = False  # it is never NULL
+    is_key: bool = False  # it is the primary key
     to: str | None = None  # table to whose rows it refers, by their key
     # Of a moment: column of the table that leads to the clock that showed it.
     clock: str | None = None
@@ -93,6 +94,7 @@ def _column(match: re.Match[str]) -> StoreColumn:
         meaning["unit"],
         meaning["text"],
         is_required="NOT NULL" in match["more"] or "PRIMARY KEY" in match["more"],
+        is_key="PRIMARY KEY" in match["more"],
         to=marks.get("to"),
         clock=marks.get("clock"),
         is_hidden="hidden" in marks,

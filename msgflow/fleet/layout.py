@@ -16,7 +16,7 @@ import pyarrow.parquet
 from msgflow.errors import DatabaseError
 from msgflow.version import __version__
 
-LAKE_REVISION = 2
+LAKE_REVISION = 3
 ABOUT = "lake.json"
 RUN = "run"
 PACKED = "packed"

@@ -25,7 +25,7 @@ from msgflow.query.selection import (
 from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import LATEST, Slice
 from msgflow.sql.failure import first_line, query_errors
-from msgflow.sql.statement import may_have_rows, recorded
+from msgflow.sql.statement import internal_sql, may_have_rows, recorded
 from msgflow.sql.value import described_type, parse_text
 from msgflow.text.name_suggestions import did_you_mean
 
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from msgflow.run.choice import Run
     from msgflow.sql.header import Header, Param
+    from msgflow.sql.statement import Statements
     from msgflow.sql.value import Value
 
 _COLUMN = re.compile(r'Referenced column "([^"]*)"')
@@ -45,15 +46,15 @@ class Steps:
     """The tables of the steps of queries: those that several queries share are made once.
 
     Two queries share a table if the same statement makes it, with the same values. The tables are
-    dropped at the end of the `with` block. `known` names for a table the query that has its rows at
-    less cost, from tables that are there by then.
+    dropped at the end of the `with` block. `known` has a statement of the name of each step whose
+    rows cost less, from tables that are there by then.
     """
 
     def __init__(
-        self, connection: duckdb.DuckDBPyConnection, known: Mapping[str, str] | None = None
+        self, connection: duckdb.DuckDBPyConnection, known: Statements | None = None
     ) -> None:
         self._connection = connection
-        self._known = known or {}
+        self._known = known
         self._made: dict[str, tuple[str, dict[str, Any]]] = {}
 
     def __enter__(self) -> Self:
@@ -82,12 +83,14 @@ class Steps:
                 made = list(self._made)
                 self._made |= dict.fromkeys(made[made.index(step.table) :], ("", {}))
             self._made[step.table] = "", {}
-            if known := self._known.get(step.table):
-                self._execute(f"CREATE OR REPLACE TEMP TABLE {step.table} AS {known}", values)
+            if self._known is not None and step.table in self._known.names():
+                self._known.keep(self._connection, step.table, values)
             elif may_have_rows(self._connection, step.sources, values):
                 self._connection.execute(*wanted)
             else:
-                self._execute(f"CREATE OR REPLACE TEMP TABLE {step.table} ({step.columns})", {})
+                self._connection.execute(
+                    f"CREATE OR REPLACE TEMP TABLE {step.table} ({step.columns})"
+                )
             self._made[step.table] = wanted
 
     def answer(self, sql: str, values: Mapping[str, Any]) -> pa.Table:
@@ -96,10 +99,10 @@ class Steps:
         self._connection.execute(f"CREATE OR REPLACE TEMP TABLE answer AS {sql}", values)
         return self._connection.sql("FROM temp.answer").to_arrow_table()
 
-    def _execute(self, sql: str, values: Mapping[str, Any]) -> None:
-        (statement,) = self._connection.extract_statements(sql)
-        bound = {name: values[name] for name in statement.named_parameters}
-        self._connection.execute(statement, bound)
+    def keep(self, name: str, values: Mapping[str, Any]) -> None:
+        """Make a table of the rows of a statement of `schema/internal`, which has its name."""
+        self._made[name] = "", {}
+        internal_sql().keep(self._connection, name, values)
 
 
 def run_query(

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import fnmatch
 import shlex
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
-from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import NoFlowError
+from msgflow.files.resources import resource_directory
 from msgflow.query.catalogue import load_query
 from msgflow.query.compare import warm_up_seconds
 from msgflow.query.names import with_path_numbers
 from msgflow.query.runner import Steps, run_query
-from msgflow.sql.statement import internal_sql, registered
-from msgflow.text.values import format_duration
+from msgflow.sql.statement import (
+    Statements,
+    health_sql,
+    internal_sql,
+    may_have_rows,
+    registered,
+)
+from msgflow.text.values import ARROW, format_duration
 
 if TYPE_CHECKING:
     import duckdb
@@ -24,47 +31,18 @@ if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
     from msgflow.run.choice import Run
     from msgflow.run.slice import Slice
+    from msgflow.sql.header import Header
     from msgflow.sql.value import Value
 
-    Ask = Callable[..., QueryResult]
-
-_PIECES = 5
-_OF_VERDICT = ("open_end", "why_callback", "suspect")
-_DEAD_ENDS = (
-    "SELECT subject, detail FROM store.finding WHERE name = 'dead_end' AND list_contains(?, run_id)"
-)
-# Steps whose rows an earlier query of the explanation has in its tables: it costs less to read them
-# there. The breakdown explains the waits of all flows, and one of these is the flow that is shown.
-_KNOWN = {
-    "explained_wait": "FROM main.executor_wait_explained("
-    "$runs, arrivals := 'exact_arrival', waits := 'ready_wait',"
-    " has_kernel := $has_kernel, has_teams := $has_teams)",
-    "breakdown_wait": "SELECT callback_instance_id, executor_id, busy_min_ns, busy_max_ns,"
-    " held_max_ns FROM explained_wait",
-    "critical_trail": "SELECT c.flow_id, t.hop, t.take_id, t.publication_id, t.previous_take_id,"
-    " t.next_take_id FROM critical_flow AS c JOIN breakdown_flow AS b ON c.path_id = b.path_id"
-    " AND c.root_kind = b.root_kind AND c.root_id = b.root_id AND c.take_id = b.take_id"
-    " JOIN breakdown_trail AS t ON b.flow_id = t.flow_id",
-    "critical_part": "FROM main.end_to_end_piece_explained("
-    "'critical_flow', 'critical_trail', 'breakdown_callback', $runs, has_turns := $has_turns)",
-    "critical_piece": "FROM main.critical_piece('critical_part', $runs, waits := 'ready_wait',"
-    " has_kernel := $has_kernel, has_calls := $has_calls, has_teams := $has_teams)",
-}
-_SAMPLED = "SELECT 1 FROM main.stack_sample WHERE run_id = ? LIMIT 1"
-# How to know what a sentence says is not known.
-_UNKNOWN = {
-    "not known without a kernel trace": "msgflow record --kernel shows what had the CPU",
-    "not known without its callbacks": "msgflow record -- COMMAND traces callbacks of Python nodes",
+# The query whose paths are explained.
+_FIRST = "e2e-latency"
+# By what a culprit lacks: how to know what is not known of it.
+_RECORDED_BY = {
+    "kernel": "msgflow record --kernel shows what had the CPU",
+    "callbacks": "msgflow record -- COMMAND traces callbacks of Python nodes",
 }
 # What a path has in place of a topic without a name.
 _UNNAMED = "?"
-# Rows of an explanation: what its callbacks waited for, what was lost on the way, and the paths.
-_OWN_WAITS = "FROM result WHERE list_contains($callbacks, [node, callback]) LIMIT 3"
-_OWN_LOSSES = (
-    f"FROM result WHERE list_contains($places, coalesce(topic_name, '{_UNNAMED}'))"
-    " AND list_contains($places, subscriber) AND dropped + lost > 0"
-)
-_WORST_FIRST = "FROM result ORDER BY path <> $path, p95_ns DESC NULLS LAST, path"
 
 
 @dataclass(frozen=True)
@@ -110,128 +88,169 @@ def explain(
     connection: duckdb.DuckDBPyConnection, run: Run, times: Slice, place: str | None = None
 ) -> Explanation:
     """Return why flows of a run are late that end at a place; raise NoFlowError if none does."""
-    with Steps(connection, _KNOWN) as steps:
-
-        def ask(name: str, part: Slice, **given: Value) -> QueryResult:
-            header, is_first = load_query(name), name == "e2e-latency"
-            # It has looked for the places that are asked for; others are of its paths.
-            result = run_query(
-                connection, header, given, part, steps=steps, runs=(run,), is_known=not is_first
-            )
-            # Only its paths have to be told apart.
-            if not is_first:
-                return result
-            return with_path_numbers(connection, result, *([] if given else ["named_path"]))
-
-        try:
-            return _explained(connection, ask, run, times, place, steps.recorded)
-        finally:
-            for name in ("ready_wait", *_OF_VERDICT):
-                connection.execute(f"DROP TABLE IF EXISTS temp.{name}")
+    # Other queries have the rows of these steps by then, or most of what they are made of.
+    known = Statements(resource_directory("schema") / "internal" / "why" / "step")
+    with Steps(connection, known) as steps:
+        return _Questions(connection, steps, run, place).explanation(times)
 
 
-def _explained(
-    connection: duckdb.DuckDBPyConnection,
-    ask_of: Ask,
-    run: Run,
-    asked: Slice,
-    place: str | None,
-    recorded: Mapping[str, bool],
-) -> Explanation:
-    ends = {} if place is None else {"to": place}
-    paths = ask_of("e2e-latency", asked, **ends)
-    if not _has_flows(paths):
-        raise _nothing(partial(ask_of, part=asked), place)
-    skipped = 0.0
-    if asked.start is None:
-        # Of the flows that were read, as `compare` finds it.
-        ((last_ns,),) = internal_sql().run(connection, "warm_up", {}).fetchall()
-        skipped = warm_up_seconds(None if last_ns is None else last_ns - (run.start_ns or 0))
-    # It ends with a step, which may lie behind all that was asked for.
-    if (run.start_ns or 0) + skipped * 1e9 >= asked.window([run]).end_ns:
-        skipped = 0.0
-    times = asked
-    if skipped:
-        later = replace(asked, start=f"{skipped:g}s")
-        warm = ask_of("e2e-latency", later, **ends)
-        # A recording may be shorter than the steps in which it is left out.
-        times, paths, skipped = (later, warm, skipped) if _has_flows(warm) else (asked, paths, 0.0)
-    ask = partial(ask_of, part=times)
-    values = {"runs": [run.run_id], **times.window([run]).bindings, **recorded}
-    values["asked_ns"] = asked.window([run]).start_ns
-    internal_sql().keep(connection, "ready_wait", values)
-    waits = ask("waits-pair")
-    parts = ask("path-breakdown", **ends)
-    # What is lost while a system warms up is lost.
-    losses = ask_of("topics-delivery", asked)
-    shown = paths.table["path"].to_pylist()
-    tables = {"path_row": paths.table, "breakdown": parts.table, "delivery": losses.table}
-    with registered(connection, **tables):
-        for name in _OF_VERDICT:
-            internal_sql().keep(connection, name, values)
-        verdict = internal_sql().run(connection, "verdict", values).to_arrow_table()
-    path = _worst(verdict, paths)
-    places = path.split(" → ")
-    flow = ask("critical-path", **ends, via=[path], quantile="p95")
-    parts = _rows(connection, "FROM result WHERE path = $path", parts, "result", path=path)
-    callbacks = [[row["node"], row["what"]] for row in parts.table.to_pylist()]
-    # What is said of paths that end at a node which publishes.
-    ends_of = [each.split(" → ")[-2:] for each in ([path] if place is None else shown)]
-    dead_ends = connection.execute(_DEAD_ENDS, [values["runs"]]).fetchall()
-    said = (
-        detail
-        for node, detail in dead_ends
-        if any(node == last and f" on {topic} " in detail for topic, last in ends_of)
-    )
-    ends_here = list(dict.fromkeys(said))
-    waits = _rows(connection, _OWN_WAITS, waits, "result", callbacks=callbacks)
-    losses = _rows(connection, _OWN_LOSSES, losses, "result", places=places)
-    paths = _rows(connection, _WORST_FIRST, paths, "result", path=path)
-    internal, since = internal_sql(), ["--start", f"{skipped:g}s"] if skipped else []
-    asked_for = {"has_unknown": bool(ends_here) or _UNNAMED in places, "since": since}
-    with registered(connection, piece=flow.table, loss=losses.table):
-        steps = internal.run(connection, "next_command", asked_for).fetchall()
-    computes = _functions(connection, run, {**values, "callbacks": callbacks}, since)
-    sentences = " ".join(verdict["sentence"].to_pylist())
-    notes = [cure for unknown, cure in _UNKNOWN.items() if unknown in sentences]
-    if skipped:
-        notes.append(
-            f"without the first {skipped:g} s, a warm-up: the longest latencies lie there (--start"
-            " 0s reads them, too)"
+@dataclass(frozen=True)
+class _Questions:
+    """What is asked of a run to explain why its flows are late."""
+
+    connection: duckdb.DuckDBPyConnection
+    steps: Steps
+    run: Run
+    place: str | None
+
+    def explanation(self, asked: Slice) -> Explanation:
+        """Ask all that an explanation consists of."""
+        times, paths = self.paths(asked)
+        values: dict[str, Any] = {
+            "runs": [self.run.run_id],
+            **times.window([self.run]).bindings,
+            "asked_ns": asked.window([self.run]).start_ns,
+            **self.steps.recorded,
+        }
+        self.steps.keep("ready_wait", values)
+        waits = self.ask("waits-pair", times)
+        parts = self.ask("path-breakdown", times, to=self.place)
+        # What is lost while a system warms up is lost.
+        losses = self.ask("topics-delivery", asked)
+        tables = {"path_row": paths.table, "breakdown": parts.table, "delivery": losses.table}
+        with registered(self.connection, **tables):
+            for name in ("open_end", "why_callback", "suspect"):
+                self.steps.keep(name, values)
+            verdict = internal_sql().run(self.connection, "verdict", values).to_arrow_table()
+        values["path"] = path = _worst(verdict, paths)
+        values["paths"] = [path] if self.place is None else paths.table["path"].to_pylist()
+        flow = self.ask("critical-path", times, to=self.place, via=[path], quantile="p95")
+        paths = self.rows("worst_first", paths, values)
+        parts = self.rows("path_part", parts, values)
+        losses = self.rows("own_loss", losses, values)
+        values["callbacks"] = [[row["node"], row["what"]] for row in parts.table.to_pylist()]
+        with registered(self.connection, piece=flow.table):
+            names = ("kept_input", "piece_to_ask", "callback_function")
+            kept, pieces, functions = (self.internal(name, values) for name in names)
+        since = ["--start", str(times.start)] if times != asked else []
+        shown: list[tuple[Header, Sequence[Mapping[str, Any]], Sequence[str]]] = [
+            (health_sql().header("dead_end"), kept, ()),
+            (
+                health_sql().header("topic_unnamed"),
+                [values] if _UNNAMED in path.split(ARROW) else [],
+                (),
+            ),
+            (internal_sql().header("piece_to_ask"), pieces, since),
+            (load_query("critical-path"), flow.table.to_pylist()[:1], ()),
+            (load_query("topics-delivery"), losses.table.to_pylist(), ()),
+            (internal_sql().header("callback_function"), functions, since),
+        ]
+        steps = [
+            (*words, *more)
+            for header, rows, more in shown
+            for row in rows
+            if (words := header.next_command(row))
+        ]
+        lacking = set(chain(*verdict["lacks"].to_pylist()))
+        notes = [
+            *(cure for word, cure in _RECORDED_BY.items() if word in lacking),
+            *(
+                f"without the first {start.removesuffix('s')} s, a warm-up: the longest latencies"
+                " lie there (--start 0s reads them, too)"
+                for start in since[1:]
+            ),
+            *(row["detail"] for row in kept),
+            *_outlier(self.run, paths.table.to_pylist()[0]),
+            *paths.notes,
+            *flow.notes,
+            *_computing(functions),
+        ]
+        return Explanation(
+            run=self.run,
+            start=times.start,
+            place=self.place,
+            verdict=replace(paths, table=verdict, header=None, notes=[], path_numbers={}),
+            paths=paths,
+            nodes=self.rows("node_share", parts, values),
+            slow_flow=self.rows("longest_piece", flow, values),
+            waits=self.rows("own_wait", waits, values),
+            losses=losses,
+            steps=tuple(dict.fromkeys(steps)),
+            notes=tuple(dict.fromkeys(notes)),
         )
-    notes += [*ends_here, *_outlier(run, paths.table.to_pylist()[0]), *paths.notes, *flow.notes]
-    notes += computes[0]
-    return Explanation(
-        run=run,
-        start=times.start,
-        place=place,
-        verdict=replace(paths, table=verdict, header=None, notes=[], path_numbers={}),
-        paths=paths,
-        nodes=_rows(connection, internal.text("node_share"), parts, "breakdown", path=path),
-        slow_flow=_rows(
-            connection, internal.text("longest_piece"), flow, "slow_flow", count=_PIECES
-        ),
-        waits=waits,
-        losses=losses,
-        steps=(*(tuple(words) for (words,) in steps), *computes[1]),
-        notes=tuple(dict.fromkeys(notes)),
-    )
+
+    def paths(self, asked: Slice) -> tuple[Slice, QueryResult]:
+        """Return the paths, and the times that are read of them: a warm-up is left out."""
+        times, paths = asked, self.ask(_FIRST, asked, to=self.place)
+        if not _has_flows(paths):
+            raise self.nothing(asked)
+        # Of the flows that were read, as `compare` finds it.
+        ((last_ns,),) = internal_sql().run(self.connection, "warm_up", {}).fetchall()
+        if asked.start is None and last_ns is not None:
+            later = replace(
+                asked, start=f"{warm_up_seconds(last_ns - (self.run.start_ns or 0)):g}s"
+            )
+            # It ends with a step, which may lie behind all that was asked for or recorded.
+            if later.window([self.run]).start_ns < asked.window([self.run]).end_ns:
+                warm = self.ask(_FIRST, later, to=self.place)
+                if _has_flows(warm):
+                    times, paths = later, warm
+        # Only its paths have to be told apart.
+        known = ["named_path"] if self.place is None else []
+        return times, with_path_numbers(self.connection, paths, *known)
+
+    def ask(self, name: str, times: Slice, **given: Value) -> QueryResult:
+        """Return the answer of a named query; its steps stay for the next one."""
+        return run_query(
+            self.connection,
+            load_query(name),
+            given,
+            times,
+            steps=self.steps,
+            runs=(self.run,),
+            # The first one looks for the places that are asked for; others are of its paths.
+            is_known=name != _FIRST,
+        )
+
+    def internal(self, name: str, values: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Return the rows of a statement of `schema/internal`, none if it has nothing to read."""
+        if not may_have_rows(self.connection, internal_sql().header(name).sources, values):
+            return []
+        return list(internal_sql().rows(self.connection, name, values))
+
+    def rows(self, name: str, of: QueryResult, values: Mapping[str, Any]) -> QueryResult:
+        """Return a result with the rows of a statement, which reads its table."""
+        (table,) = internal_sql().header(name).reads
+        with registered(self.connection, **{table: of.table}):
+            rows = internal_sql().run(self.connection, name, values).to_arrow_table()
+        return replace(of, table=rows)
+
+    def nothing(self, asked: Slice) -> NoFlowError:
+        """Return what to say where no flow ends at a place: flows may begin there or pass."""
+        message = "no flow arrives at the end of a path"
+        if self.place is not None:
+            message = f"no flow arrives — {self.place}"
+            paths = self.ask(_FIRST, asked).table["path"].to_pylist()
+            steps = {step.strip("()") for path in paths for step in path.split(ARROW)}
+            if fnmatch.filter(steps, self.place):
+                return NoFlowError(
+                    f"flows begin there or pass, none ends — {self.place}",
+                    shlex.join(["msgflow", "query", _FIRST, "--via", self.place]),
+                )
+        return NoFlowError(message, "msgflow check says where flows break off")
+
+
+def _has_flows(paths: QueryResult) -> bool:
+    return any(paths.table["pairs"].to_pylist())
 
 
 def _worst(verdict: pa.Table, paths: QueryResult) -> str:
     """Return the path that the worst culprit delays, else the one that is slowest as a rule."""
-    for path in verdict["path"].to_pylist():
-        if path is not None:
-            return str(path)
     slowest = max(paths.table.to_pylist(), key=lambda row: row["p95_ns"] or 0)
-    return str(slowest["path"])
+    return str(next(filter(None, verdict["path"].to_pylist()), slowest["path"]))
 
 
-def _has_flows(paths: QueryResult) -> bool:
-    return any(row["pairs"] for row in paths.table.to_pylist())
-
-
-def _outlier(run: Run, path: dict[str, Any]) -> Iterator[str]:
+def _outlier(run: Run, path: Mapping[str, Any]) -> Iterator[str]:
     """Yield when the slowest flow of a path began, if nearly all others took far less."""
     if path["max_ns"] > 2 * path["p95_ns"]:
         at_s = (path["max_root_ns"] - (run.start_ns or 0)) / 1e9
@@ -241,43 +260,9 @@ def _outlier(run: Run, path: dict[str, Any]) -> Iterator[str]:
         )
 
 
-def _nothing(ask: Ask, place: str | None) -> NoFlowError:
-    """Return what to say where no flow ends at a place: flows may begin there or pass."""
-    if place is None:
-        message = "no flow arrives at the end of a path"
-    elif any(
-        fnmatchcase(step.strip("()"), place)
-        for row in ask("e2e-latency").table.to_pylist()
-        for step in row["path"].split(" → ")
-    ):
-        return NoFlowError(
-            f"flows begin there or pass, none ends — {place}",
-            shlex.join(["msgflow", "query", "e2e-latency", "--via", place]),
-        )
-    else:
-        message = f"no flow arrives — {place}"
-    return NoFlowError(message, "msgflow check says where flows break off")
-
-
-def _rows(
-    connection: duckdb.DuckDBPyConnection, sql: str, of: QueryResult, name: str, **values: Any
-) -> QueryResult:
-    """Return a result with the rows of a query on it, which reads it by this name."""
-    with registered(connection, **{name: of.table}):
-        return replace(of, table=connection.sql(sql, params=values).to_arrow_table())
-
-
-def _functions(
-    connection: duckdb.DuckDBPyConnection, run: Run, values: Mapping[str, Any], since: list[str]
-) -> tuple[list[str], list[tuple[str, ...]]]:
-    """Return a sentence on the callback that computes most, where samples are, and a command."""
-    if not connection.execute(_SAMPLED, [run.run_id]).fetchall():
-        return [], []
-    asked = {"run_id": run.run_id, **values}
-    rows = internal_sql().run(connection, "callback_function", asked).fetchall()
-    if not rows:
-        return [], []
-    node, callback, *_, samples = rows[0]
-    shares = ", ".join(f"{function} {100 * share:.0f} %" for *_, function, share, _ in rows)
-    said = f"CPU time of {node} {callback}: {shares} (of {samples:,} samples)"
-    return [said], [("query", "functions", "--node", node, "--callback", callback, *since)]
+def _computing(functions: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield in which functions the callback was that computes most."""
+    shares = ", ".join(f"{row['function']} {100 * row['self_share']:.0f} %" for row in functions)
+    for row in functions[:1]:
+        of = f"(of {row['all_samples']:,} samples)"
+        yield f"CPU time of {row['node']} {row['callback']}: {shares} {of}"

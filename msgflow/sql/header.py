@@ -97,7 +97,7 @@ _FIELD = re.compile(r"-- (?P<key>[a-z_]+):(?: +(?P<value>\S.*))?")
 _CONTINUATION = re.compile(r"-- {4,}(?P<value>\S.*)")
 _NAME = r"(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
 _NAMES = re.compile(r"\w+(?:, *\w+)*")
-_TYPE = r"(?P<type>[A-Za-z_][A-Za-z0-9_]*(?:\([0-9, ]+\))?(?:\[\])*)"
+_TYPE = r"(?P<type>[A-Za-z_][A-Za-z0-9_]*(?:\([A-Z0-9, ]+\))?(?:\[\])*)"
 _CHOICES = r"(?: +\{(?P<choices>[^{}]+)\})?"
 _DEFAULT = r"(?: += +(?P<default>'(?:[^']|'')*'|\[[^\]]*\]|[^'\s\[]\S*))?"
 _PARAM = re.compile(rf"{_NAME} +{_TYPE}{_CHOICES}{_DEFAULT}(?P<gap> +)(?P<description>\S.*)")

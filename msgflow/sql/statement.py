@@ -172,3 +172,9 @@ def registered(
 def internal_sql() -> Statements:
     """Return what the program asks for itself: rows that become files, pictures or sentences."""
     return Statements(resource_directory("schema") / "internal")
+
+
+@cache
+def health_sql() -> Statements:
+    """Return the kinds of findings: what is worth knowing about input, recording and database."""
+    return Statements(resource_directory("schema") / "health")

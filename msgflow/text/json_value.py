@@ -12,7 +12,8 @@ from typing import Any
 def json_value(value: Any) -> Any:
     """Return a value made of None, bool, int, float, str, list and dict only.
 
-    Bytes become hexadecimal text, whole decimals become integers, NaN and infinities become None.
+    Bytes become hexadecimal text, whole decimals become integers, NaN and infinities become None,
+    and the pairs that Arrow makes of a map become a dict.
     """
     if value is None or isinstance(value, bool | int | str):
         return value
@@ -26,9 +27,18 @@ def json_value(value: Any) -> Any:
         return value.isoformat()
     if isinstance(value, dict):
         return {str(key): json_value(item) for key, item in value.items()}
+    if is_map(value):
+        return {str(key): json_value(item) for key, item in value}
     if isinstance(value, list | tuple):
         return [json_value(item) for item in value]
     return str(value)
+
+
+def is_map(value: Any) -> bool:
+    """Tell whether a value is a map with entries, as Arrow returns it: a list of pairs."""
+    return (
+        isinstance(value, list) and bool(value) and all(isinstance(item, tuple) for item in value)
+    )
 
 
 def json_text(value: Any) -> str | None:

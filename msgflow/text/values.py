@@ -9,7 +9,7 @@ import re
 from typing import Any
 
 from msgflow.run.window import format_epoch
-from msgflow.text.json_value import json_value
+from msgflow.text.json_value import is_map, json_value
 
 ARROW = " → "
 """Between the steps of a path."""
@@ -50,9 +50,12 @@ def format_cell(value: Any, unit: str | None = None, *, is_handle: bool = False)
         return "yes" if value else "no"
     if isinstance(value, int):
         return _number(value, unit, is_handle)
-    # A map, such as labels.
-    if isinstance(value, list) and value and all(isinstance(item, tuple) for item in value):
-        return ", ".join("=".join(map(format_cell, item)) for item in value)
+    if is_map(value):
+        # Counts of words are read as a sentence is, labels as they are given.
+        return ", ".join(
+            f"{format_cell(key)}{' ' if isinstance(item, int) else '='}{format_cell(item)}"
+            for key, item in value
+        )
     value = json_value(value)
     if value is None:
         return NULL

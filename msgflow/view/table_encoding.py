@@ -20,7 +20,7 @@ import pyarrow as pa
 from pyarrow import compute
 
 from msgflow.result.query_result import QueryResult
-from msgflow.text.values import printable
+from msgflow.text.values import format_cell, printable
 from msgflow.trace.numpy_arrow import is_valid, to_numpy
 
 LARGEST_EXACT = 2**53
@@ -76,8 +76,14 @@ def _column(column: pa.Array, origin: int) -> tuple[dict[str, Any], bytes]:
         return {"type": "double"}, values.tobytes()
     if pa.types.is_string(kind) or pa.types.is_large_string(kind):
         return _text(column)
+    if pa.types.is_map(kind):
+        return _text(pa.array(map(_map_text, column.to_pylist()), pa.string()))
     texts = json.dumps(_shown(column.to_pylist()), ensure_ascii=False, default=str)
     return {"type": "json"}, texts.encode()
+
+
+def _map_text(value: Any) -> str | None:
+    return None if value is None else format_cell(value)
 
 
 def _shown(value: Any) -> Any:

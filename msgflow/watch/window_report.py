@@ -87,7 +87,7 @@ def report_of(con: duckdb.DuckDBPyConnection, window: Window) -> WindowReport:
         table = run_query(con, load_query(name), {}, part).table
         if "topic_name" in table.column_names:
             table = table.rename_columns({"topic_name": "topic"})
-        rows: list[Row] = table.select(list(columns)).to_pylist()
+        rows: list[Row] = json_value(table.select(list(columns)).to_pylist())
         return rows
 
     paths = ask("e2e-latency", _PATH)

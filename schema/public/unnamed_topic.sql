@@ -7,6 +7,8 @@
 -- column: message_count BIGINT  Messages published, or taken where no publisher is known
 -- column: publishers VARCHAR  Nodes that publish, or their processes in brackets; NULL: not known
 -- column: subscribers VARCHAR  Nodes that take the messages, likewise
+-- column: publishing_node_id BIGINT  First of the nodes that publish
+-- column: node_id BIGINT  First of the nodes that take the messages
 -- column: entry VARCHAR  What an entry of a file of links knows the topic by
 CREATE OR REPLACE MACRO main.unnamed_topic(only_run) AS TABLE
 WITH published AS (
@@ -23,7 +25,7 @@ taken AS (
 ),
 member AS (
     SELECT
-        e.run_id, e.kind, e.id, e.entry,
+        e.run_id, e.kind, e.id, e.entry, e.node_id,
         coalesce(g.group_id, e.vertex) AS group_id,
         coalesce(b.message_count, t.message_count, 0) AS message_count,
         main.node_label(n.full_name, e.process_name, e.pid) AS node
@@ -41,6 +43,8 @@ SELECT
     )::BIGINT AS message_count,
     nullif(derive.first_three(CASE WHEN kind = 'publisher' THEN node END), '') AS publishers,
     nullif(derive.first_three(CASE WHEN kind = 'subscription' THEN node END), '') AS subscribers,
+    min(node_id) FILTER (kind = 'publisher') AS publishing_node_id,
+    min(node_id) FILTER (kind = 'subscription') AS node_id,
     arg_min(entry, (kind <> 'publisher', -message_count, id)) AS entry
 FROM member
 GROUP BY run_id, group_id

@@ -19,7 +19,7 @@ from thorough import few
 
 from msgflow.bag.messages import read_bag
 from msgflow.database import open_db
-from msgflow.errors import TraceError, UsageError
+from msgflow.errors import DatabaseError, TraceError, UsageError
 
 rosbag2 = pytest.importorskip("rosbags.rosbag2")
 typesys = pytest.importorskip("rosbags.typesys")
@@ -412,3 +412,9 @@ def test_clocks_that_were_brought_together_are_joined(drifting: tuple[Path, Path
     rows = stored(path)
     assert len(rows) == sum(row["joined"] for row in found.values()) > len(sent) / 2
     assert all(row["stamp_ns"] == row["publication_id"] for row in rows)
+
+
+def test_tables_of_another_version_are_refused(older_database: Path, tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", [(1, "/plain", SECOND)])
+    with pytest.raises(DatabaseError, match="not as this msgflow makes it"):
+        join(older_database, bag)

@@ -74,7 +74,7 @@ def test_a_changed_database_is_not_written(
     before = small_database.read_bytes()
     for use in writers(trace):
         with pytest.raises(
-            DatabaseError, match=f"not as msgflow makes it: it .* {name} — "
+            DatabaseError, match=f"not as this msgflow makes it: it .* {name} — "
         ) as raised:
             use(small_database)
         assert "secret" not in str(raised.value).replace(str(tmp_path), "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -16,9 +17,10 @@ import pytest
 from thorough import examples, thorough
 
 from msgflow.db import derivation, migration, objects
-from msgflow.db.connection import connect, recorded_revision
+from msgflow.db.connection import INGEST_AGAIN, connect, recorded_revision
 from msgflow.db.empty_database import write_empty
 from msgflow.db.sandbox import open_file
+from msgflow.db.store_table import store_file
 from msgflow.errors import DatabaseError
 from msgflow.files.resources import resource_directory
 
@@ -70,14 +72,17 @@ def database(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
-    """The made-up revision, while msgflow has it."""
+    """The made-up revision, while msgflow has it: frozen as a release freezes one."""
     folder = tmp_path / "migrations"
     shutil.copytree(resource_directory("migrations"), folder)
     newest = folder / "versions" / f"{HEAD}.py"
-    text = newest.read_text()
-    older = text.replace(", clock_sync VARCHAR", "").replace(HEAD, BEFORE)
-    assert older.count("\n") == text.count("\n")
-    newest.with_name(f"{BEFORE}.py").write_text(older)
+    older = newest.read_text().replace("store_file()", "Path(__file__).with_suffix('.sql')")
+    newest.with_name(f"{BEFORE}.py").write_text(
+        f"from pathlib import Path\n{older.replace(HEAD, BEFORE)}"
+    )
+    tables, removed = re.subn(r",(  --.*)\n    clock_sync .*", r"\1", store_file().read_text())
+    assert removed == 1
+    newest.with_name(f"{BEFORE}.sql").write_text(tables)
     newest.write_text(
         f"from alembic import op\nrevision, down_revision = {HEAD!r}, {BEFORE!r}\n"
         f"def upgrade(): op.execute({ADD_COLUMN!r})\n"
@@ -192,7 +197,7 @@ def test_a_file_with_tables_that_its_revision_does_not_have_is_refused(
     before = path.read_bytes()
     with pytest.raises(DatabaseError, match=message) as refused:
         migration.upgrade(path)
-    assert refused.value.hint == "ingest the traces into a new file"
+    assert refused.value.hint == INGEST_AGAIN
     assert path.read_bytes() == before
 
 
@@ -260,7 +265,7 @@ def test_other_tables_without_another_revision_are_refused(database: Path) -> No
     for action in (lambda: connect(database, read_only=False), lambda: migration.upgrade(database)):
         with pytest.raises(DatabaseError, match=r"another table store\.take") as refused:
             action()
-        assert refused.value.hint == "ingest the traces into a new file"
+        assert refused.value.hint == INGEST_AGAIN
 
 
 def test_a_new_database_is_the_same_with_and_without_a_cache(
@@ -411,7 +416,7 @@ def test_upgrade_of_other_tables_is_refused(database: Path) -> None:
     for command in (migration.upgrade, lambda path: connect(path, read_only=True)):
         with pytest.raises(DatabaseError, match="lacks a table") as raised:
             command(database)
-        assert raised.value.hint == "ingest the traces into a new file"
+        assert raised.value.hint == INGEST_AGAIN
     assert database.read_bytes() == before
 
 
@@ -500,7 +505,7 @@ def test_an_upgrade_that_ends_early_changes_nothing(
             "VALUES (1, 'stale', now(), '0', 'old')"
         )
         con.execute("CREATE OR REPLACE VIEW main.run AS SELECT 1 AS one")
-    monkeypatch.setattr(derivation, "derive", Mock(side_effect=KeyboardInterrupt))
+    monkeypatch.setattr(migration, "derive", Mock(side_effect=KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         migration.upgrade(database)
     with duckdb.connect(str(database)) as con:

@@ -8,7 +8,7 @@ import duckdb
 import pytest
 
 from msgflow.db import store
-from msgflow.db.tables import STORE
+from msgflow.db.store_table import store_tables
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def con(fresh_database: Path) -> duckdb.DuckDBPyConnection:
     con.execute("SET preserve_insertion_order = false")
     columns = ", ".join(
         f'"{column.name}" {column.type}'
-        for column in STORE.tables["store.take"].columns
+        for column in store_tables()["take"].columns.values()
         if column.name != "run_id"
     )
     con.execute(f"CREATE TABLE staging.take ({columns})")

@@ -1,41 +1,47 @@
-"""Tables as `schema/store.sql` describes them are those that SQLAlchemy defines."""
+"""Tables are read from `schema/store.sql` as DuckDB reads them."""
 
 from __future__ import annotations
 
-import pytest
-from sqlalchemy import Column, Table
+from pathlib import Path
 
-from msgflow.db.store_table import StoreColumn, store_tables
-from msgflow.db.tables import STORE
+import duckdb
+
+from msgflow.db.store_table import store_tables
+
+# That of Alembic.
+OTHERS = {"alembic_version"}
 
 
-def told(column: StoreColumn) -> dict[str, object]:
-    """All that is read of a column but its type, as SQLAlchemy has it."""
-    marks = {"unit": column.unit, "clock": column.clock, "sql": column.sql}
-    marks["is_hidden"] = column.is_hidden or None
-    return {
-        "name": column.name,
-        "comment": column.description + (f" [{column.unit}]" if column.unit else ""),
-        "nullable": not column.is_required,
-        "to": [f"store.{column.to}.{column.to}_id"] if column.to else [],
-        "info": {key: value for key, value in marks.items() if value is not None},
+def test_tables_are_those_of_a_new_database(empty_database: Path) -> None:
+    """All of their columns; types and comments are compared by tests/test_schema.py."""
+    with duckdb.connect(str(empty_database), read_only=True) as con:
+        rows = con.execute(
+            "SELECT table_name, column_name, is_nullable FROM duckdb_columns() "
+            "WHERE schema_name = 'store'"
+        ).fetchall()
+        keys = con.execute(
+            "SELECT table_name, constraint_column_names[1] FROM duckdb_constraints() "
+            "WHERE schema_name = 'store' AND constraint_type = 'PRIMARY KEY'"
+        ).fetchall()
+    read = {
+        (table.name, column.name, not column.is_required)
+        for table in store_tables().values()
+        for column in table.columns.values()
     }
+    assert read == {row for row in rows if row[0] not in OTHERS}
+    assert {
+        (table.name, column.name)
+        for table in store_tables().values()
+        for column in table.columns.values()
+        if column.is_key
+    } == {key for key in keys if key[0] not in OTHERS}
 
 
-def defined(column: Column[object]) -> dict[str, object]:
-    to = [key.target_fullname for key in column.foreign_keys]
-    parts = {name: getattr(column, name) for name in ("name", "comment", "nullable", "info")}
-    return {**parts, "to": to}
-
-
-def test_there_are_no_others() -> None:
-    assert list(store_tables()) == [table.name for table in STORE.tables.values()]
-
-
-@pytest.mark.parametrize("table", STORE.tables.values(), ids=lambda table: table.name)
-def test_a_table_is_read_as_it_is_defined(table: Table) -> None:
-    """Its types are those of a new database: tests/test_schema.py."""
-    found = store_tables()[table.name]
-    assert (found.grain, found.view) == (table.comment, table.info.get("view"))
-    assert list(map(told, found.columns.values())) == list(map(defined, table.columns))
-    assert list(map(told, found.computed)) == list(map(defined, table.info.get("computed", ())))
+def test_every_column_has_a_meaning_and_every_mark_is_known() -> None:
+    for table in store_tables().values():
+        assert table.grain.startswith("One row per "), table.name
+        for column in (*table.columns.values(), *table.computed):
+            assert column.description, (table.name, column.name)
+            assert "{" not in column.description, (table.name, column.name)
+            assert column.to is None or column.to in store_tables()
+            assert column.clock is None or column.clock in table.columns

@@ -10,7 +10,6 @@ import pytest
 
 from msgflow.db import objects
 from msgflow.db.store_table import store_tables, table_views
-from msgflow.db.tables import STORE
 from msgflow.files.resources import resource_directory
 from msgflow.sql.header import parse
 
@@ -65,9 +64,12 @@ def test_columns_are_those_of_the_output(
         "WHERE schema_name || '.' || table_name = ?",
         [view.name],
     ).fetchall()
-    table = STORE.tables[view.name.replace("main.", "store.")]
-    declared = (*table.columns, *table.info.get("computed", ()))
-    assert dict(comments).items() <= {column.name: column.comment for column in declared}.items()
+    table = store_tables()[view.name.removeprefix("main.")]
+    said = {
+        column.name: column.description + (f" [{column.unit}]" if column.unit else "")
+        for column in (*table.columns.values(), *table.computed)
+    }
+    assert dict(comments).items() <= said.items()
 
 
 @pytest.mark.parametrize("view", VIEWS, ids=lambda view: view.name)
@@ -76,10 +78,10 @@ def test_times_of_a_clock_are_corrected_and_nothing_else(
 ) -> None:
     (row,) = filled.sql(f"FROM {view.name}").fetchall()
     shown = dict(zip((column.name for column in view.columns), row, strict=True))
-    table = STORE.tables[view.name.replace("main.", "store.")]
-    (row,) = filled.sql(f"FROM {table.fullname}").fetchall()
-    stored = dict(zip(table.columns.keys(), row, strict=True))
-    is_corrected = {column.name for column in table.columns if "clock" in column.info}
+    table = store_tables()[view.name.removeprefix("main.")]
+    (row,) = filled.sql(f"FROM store.{table.name}").fetchall()
+    stored = dict(zip(table.columns, row, strict=True))
+    is_corrected = {name for name, column in table.columns.items() if column.clock}
     for name, value in shown.items():
         if name in is_corrected:
             assert value == stored[name] + AHEAD_NS, name
@@ -91,10 +93,10 @@ def test_what_is_corrected() -> None:
     """All moments but stamps of the clock of ROS, and those of clocks themselves."""
     as_recorded = {
         (table.name, column.name)
-        for table in STORE.tables.values()
-        if "view" in table.info
-        for column in table.columns
-        if column.info.get("unit") == "epoch ns" and not {"is_hidden", "clock"} & column.info.keys()
+        for table in store_tables().values()
+        if table.view
+        for column in table.columns.values()
+        if column.unit == "epoch ns" and not (column.is_hidden or column.clock)
     }
     assert as_recorded == {
         ("publication", "source_timestamp_ns"),

@@ -14,7 +14,7 @@ from random_system import random_system
 from ros_system import RosSystem
 from thorough import examples
 
-from msgflow.db.tables import STORE
+from msgflow.db.store_table import store_tables
 from msgflow.ingest.catalogue import load
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
@@ -45,12 +45,12 @@ def outputs(analysis: Analysis, hidden: frozenset[str] = frozenset()) -> dict[st
     result = {}
     # All of it at once, not what one table needs after the other.
     assert analysis.connection
-    for table in STORE.tables.values():
+    for table in store_tables().values():
         if "run_id" not in table.columns or table.name == "run":
             continue
-        names = [each.name for each in table.columns if each.name not in hidden]
+        names = [name for name in table.columns if name not in hidden]
         result[table.name] = analysis.rows(
-            f"SELECT {', '.join(names)} FROM {table.fullname} ORDER BY ALL"
+            f"SELECT {', '.join(names)} FROM store.{table.name} ORDER BY ALL"
         )
     result["end_to_end"] = analysis.rows(FLOWS)
     return result
@@ -120,10 +120,10 @@ def test_the_values_of_handles_do_not_matter(analysis: Analysis, seed: int) -> N
     Random(seed).shuffle(others)
     permuted = dict(zip(found, others, strict=True))
     hidden = frozenset(
-        column.name
-        for table in STORE.tables.values()
-        for column in table.columns
-        if column.name.endswith("_handle")
+        name
+        for table in store_tables().values()
+        for name in table.columns
+        if name.endswith("_handle")
     )
     analysis.build(system)
     before = outputs(analysis, hidden)

@@ -10,8 +10,8 @@ import pytest
 
 from msgflow import trace
 from msgflow.clocks.clocks_file import read_clock_sync
-from msgflow.db.tables import STORE
 from msgflow.ingest.repeated_in_memory import database_in_memory, ingest_again
+from msgflow.schema import store
 from msgflow_sim import simulate
 
 # It says when it was made.
@@ -26,7 +26,7 @@ def ingested(con: duckdb.DuckDBPyConnection, path: Path) -> dict[str, list[Any]]
         )
     return {
         table.name: con.execute(f"FROM {table.fullname} ORDER BY ALL").fetchall()
-        for table in STORE.tables.values()
+        for table in store.tables.values()
         if "run_id" in table.columns and table.name not in _OF_THE_MOMENT
     }
 

@@ -12,9 +12,9 @@ import duckdb
 import pytest
 from ingested import contents, rows
 
-from msgflow.db.tables import STORE
 from msgflow.errors import ExitCode, UsageError
 from msgflow.ingest import ingest
+from msgflow.schema import store
 
 RUNS = "SELECT run_id, name FROM run ORDER BY run_id"
 
@@ -23,7 +23,7 @@ def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:
     """Rows of a run, its ids counted from 1 as in a database of its own."""
     result = {}
     with duckdb.connect(str(database), read_only=True) as connection:
-        for table in STORE.tables.values():
+        for table in store.tables.values():
             if "run_id" not in table.columns or table.name == "run":
                 continue
             columns = []
@@ -37,7 +37,7 @@ def of_run(database: Path, run_id: int) -> dict[str, list[tuple[Any, ...]]]:
                     )
                     continue
                 # Some have no foreign key: ids below 0 stand for what is not traced.
-                own = STORE.tables.get(f"store.{column.name.removesuffix('_id')}")
+                own = store.tables.get(f"store.{column.name.removesuffix('_id')}")
                 keys = [each.column for each in column.foreign_keys]
                 key = next(iter(keys), column if own is None else own.columns.get(column.name))
                 key = column if key is None else key

@@ -91,6 +91,13 @@ def test_the_tools_and_what_they_answer(small_database: Path) -> None:
     assert hashlib.sha256(small_database.read_bytes()).digest() == before
 
 
+def test_of_tables_of_another_version_a_tool_says_what_to_do(older_database: Path) -> None:
+    ((failed, text),) = ask_here(older_database, ("info", {}))
+    assert failed
+    assert "not as this msgflow makes it" in text
+    assert "msgflow ingest TRACE --db NEW.duckdb reads the recording again" in text
+
+
 def test_a_flow_is_a_tree(small_database: Path) -> None:
     with duckdb.connect(str(small_database), read_only=True) as connection:
         number = connection.execute("SELECT min(publication_id) FROM publication").fetchall()[0][0]
@@ -300,8 +307,8 @@ def test_names_of_a_stranger_make_no_long_answers(small_database: Path, tmp_path
     with duckdb.connect(str(forged)) as con:
         con.execute("UPDATE store.run SET name = repeat('n', 100_000)")
         con.execute(
-            "INSERT INTO store.finding SELECT run_id, NULL, 'lost_packets', repeat('s', 30_000), 1,"
-            " NULL FROM store.run"
+            "INSERT INTO store.finding (run_id, name, subject, count)"
+            " SELECT run_id, 'lost_packets', repeat('s', 30_000), 1 FROM store.run"
         )
     long = "q" * 100_000
     answers = ask_here(forged, ("info", {}), ("check", {}), ("run_query", {"name": long}))

@@ -4,17 +4,43 @@ from __future__ import annotations
 
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import pytest
 from golden import fill_case
 
 import msgflow
+from msgflow.db.finding import commands_after
 from msgflow.errors import NoFlowError
+from msgflow.sql.statement import Statements
 
 SECOND = 1_000_000_000
 CASES = Path(__file__).parent / "cases"
 PATHS = {path.relative_to(CASES).as_posix(): path for path in CASES.glob("*/*.case")}
+
+
+# Findings about a node on the path, about others, a topic, a process, and all of the run.
+FOUND = """
+INSERT INTO store.finding
+    (run_id, name, process_id, node_id, publishing_node_id, topic_name, layer, subject, count,
+     detail)
+VALUES
+    (1, 'dead_end', NULL, 2, NULL, '/t', NULL, NULL, 3, 'it ends'),
+    (1, 'dead_end', NULL, 2, NULL, '/u', NULL, NULL, 3, 'all on /t end'),
+    (1, 'ambiguous_link', NULL, 2, NULL, NULL, NULL, NULL, 1, 'several'),
+    (1, 'ambiguous_cause', NULL, 3, NULL, NULL, NULL, '/b', 1, 'of /b'),
+    (1, 'message_without_stamp', NULL, NULL, NULL, '/u', NULL, '/t', 1, 'on /t'),
+    (1, 'missing_layer', NULL, NULL, NULL, NULL, 'requests', NULL, 9, 'no request'),
+    (1, 'missing_layer', NULL, NULL, NULL, NULL, 'goals', 'requests', 9, 'no goal'),
+    (1, 'never_taken', NULL, 3, 1, '/u', NULL, 'one → other', 1, 'none'),
+    (1, 'busy_waiting', 2, NULL, NULL, NULL, NULL, NULL, 99, 'again and again');
+INSERT INTO store.node (node_id, run_id, process_id, full_name, is_inferred)
+VALUES (3, 1, 1, '/c', false)
+"""
+OTHER_CLAUSE = (
+    "SELECT * REPLACE (CASE WHEN clause IS NOT NULL THEN 'not known' END AS clause) FROM ({})"
+)
 
 
 def why(database: Path, case: Path) -> msgflow.Explanation | None:
@@ -80,6 +106,58 @@ def slow_at_first(database: Path, case: Path, period_ns: int) -> None:
     )
     with duckdb.connect(str(database)) as connection:
         fill_case(connection, case)
+
+
+def facts(database: Path) -> dict[str, Any]:
+    """What an explanation says besides its sentences, and what follows from findings."""
+    with msgflow.open_db(database) as db:
+        why, findings = db.why(run=1, start="0s"), db.findings(run=1, detail=True)
+        unanswered = db.query("service-latency", run=1).notes
+        kept = {each.detail for each in findings if each.name == "dead_end"}
+    rows = why.verdict.table.to_pylist()
+    sections = {name: part.table for name, part in why.sections.items() if name != "verdict"}
+    return {
+        **sections,
+        "verdict": [
+            {name: row[name] for name in ("kinds", "cost_ns", "path", "lacks")} for row in rows
+        ],
+        "culprits": [row["who"] for row in rows if row["cost_ns"] is not None],
+        "steps": why.steps,
+        "recorded": [note for note in why.notes if note.startswith("msgflow record")],
+        "kept": len(kept.intersection(why.notes)),
+        "unanswered": unanswered,
+        "next": commands_after(findings),
+        "found": [(each.name, each.count) for each in findings],
+    }
+
+
+def test_other_words_change_no_answer(
+    fresh_database: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither those of findings nor those about culprits."""
+    slow_at_first(fresh_database, tmp_path / "slow_at_first.case", 5 * SECOND)
+    with duckdb.connect(str(fresh_database)) as connection:
+        connection.execute(FOUND)
+    said = facts(fresh_database)
+    assert [row["kinds"] for row in said["verdict"]] == [
+        ["ambiguous_link"], ["missing_layer"], ["never_taken"], ["way"],
+    ]  # fmt: skip
+    assert [row["lacks"] for row in said["verdict"]] == [[], [], [], ["callbacks"]]
+    assert said["recorded"] == ["msgflow record -- COMMAND traces callbacks of Python nodes"]
+    assert said["kept"] == 1
+    assert ("suggest", "links") in said["steps"]
+    assert said["unanswered"] == ["no request"]
+    assert said["next"] == [("suggest", "links"), ("why",)]
+    text = Statements.text
+
+    def reworded(statements: Statements, name: str) -> str:
+        body = text(statements, name)
+        return OTHER_CLAUSE.format(body) if name == "suspect" else body
+
+    monkeypatch.setattr(Statements, "text", reworded)
+    with duckdb.connect(str(fresh_database)) as connection:
+        connection.execute("UPDATE store.finding SET subject = '/b', detail = '3 messages on /t '")
+    assert facts(fresh_database) == said | {"unanswered": ["3 messages on /t "]}
 
 
 def test_a_warm_up_behind_the_end_of_what_is_asked_for_stays(

@@ -83,6 +83,8 @@ _SLICE = tuple(field.name for field in fields(Slice))
 _PAGE_QUERY = "view."
 _INTERNAL = "internal."
 _FINDING = "finding."
+# What the cases of all findings show; a column of the place only where a row has it.
+_OF_FINDINGS = ("run_id", "trace_id", "name", "subject", "count", "detail")
 _FRAME = {"run": 1, "run_id": 1, "runs": [1], "origin_ns": 0, "start_ns": 0, "end_ns": 4_000}
 _FRAME |= dict.fromkeys(RECORDED, True)
 _BENCH = pytest.StashKey["Bench"]()
@@ -514,9 +516,9 @@ def _create(connection: duckdb.DuckDBPyConnection, what: str, text: str) -> None
     """Make what stands behind CREATE, with the columns that the rows of text are of."""
     head, *rows = [line for line in text.splitlines(keepends=True) if not line.startswith("#")]
     # No type that its text does not show is found: `ids::BIGINT[]`.
-    typed = dict(re.findall(r"(\w+)::([^,\n]+)", head))
+    typed = dict(re.findall(r"(\w+)::(MAP\([^)]*\)|[^,\n]+)", head))
     with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
-        file.writelines([re.sub(r"::[^,\n]+", "", head), *rows])
+        file.writelines([re.sub(r"::(MAP\([^)]*\)|[^,\n]+)", "", head), *rows])
         file.flush()
         types = f", types = {typed}" if typed else ""
         connection.execute(f"CREATE {what} AS FROM read_csv(?, header = true{types})", [file.name])
@@ -537,8 +539,13 @@ def _finding_rows(
     text = f"FROM ({statement([header])}) ORDER BY ALL"
     (parsed,) = connection.extract_statements(text)
     values = {key: (_FRAME | given)[key] for key in parsed.named_parameters}
-    rows = connection.sql(parsed, params=values)
-    return rows.to_arrow_table()
+    rows = connection.sql(parsed, params=values).to_arrow_table()
+    unused = [
+        column
+        for column in rows.column_names
+        if column not in _OF_FINDINGS and rows[column].null_count == len(rows)
+    ]
+    return rows.drop_columns(unused)
 
 
 def _page_rows(

@@ -201,10 +201,14 @@ def _heading(report: WindowReport) -> Text:
     return text
 
 
+def _counts(row: Row) -> str:
+    return ", ".join(f"{reason} {number}" for reason, number in (row["reasons"] or {}).items())
+
+
 def _fates(path: Row) -> Text:
     counts = ", ".join(f"{path[name]:,} {name.replace('_', ' ')}" for name in _FATES if path[name])
     text = Text(printable(path["path"]), style="bold")
-    reasons = f" ({path['reasons']})" if path["reasons"] else ""
+    reasons = f" ({_counts(path)})" if path["reasons"] else ""
     doubt = f"; {path['ambiguous']:,} pass a link that may be another one" * bool(path["ambiguous"])
     text.append(
         "\n" + printable(f"{path['roots']:,} flows: {counts or 'none'}{reasons}{doubt}"),
@@ -247,7 +251,7 @@ def _topics(report: WindowReport, most: int) -> Table:
             _duration(row["period_deviation_ns"]),
             _duration(row["latency_p95_ns"]),
             *missed,
-            _short(row["reasons"] or "", _REASON_WIDTH),
+            _short(_counts(row), _REASON_WIDTH),
         )
     return table
 

@@ -41,7 +41,9 @@ completeness AS (
 reason AS (
     SELECT
         label_group, path,
-        string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS reasons
+        map(
+            list(reason ORDER BY number DESC, reason), list(number ORDER BY number DESC, reason)
+        ) AS reasons
     FROM (
         SELECT label_group, path, reason, count(*) AS number
         FROM arrival

@@ -1,30 +1,32 @@
 -- title: Reasons of messages that were not taken, counted over runs
--- description: Adds up what stands in the column reasons of delivery as 'reason 3, other 2'.
+-- description: Adds up the columns reasons and orphan_reasons of topics_delivery.
 -- grain: one row per group of runs, topic, receiving node and column
 -- kind: inline
 WITH listed AS (
-    SELECT g.label_group, d.topic_name, d.subscriber, 'reasons' AS name, d.reasons AS text
+    SELECT
+        g.label_group, d.topic_name, d.subscriber, 'reasons' AS name,
+        unnest(map_entries(d.reasons)) AS entry
     FROM topics_delivery AS d
     JOIN run_group AS g ON d.run = g.run
     UNION ALL
-    SELECT g.label_group, d.topic_name, d.subscriber, 'orphan_reasons', d.orphan_reasons
+    SELECT
+        g.label_group, d.topic_name, d.subscriber, 'orphan_reasons',
+        unnest(map_entries(d.orphan_reasons))
     FROM topics_delivery AS d
     JOIN run_group AS g ON d.run = g.run
-),
-part AS (
-    SELECT label_group, topic_name, subscriber, name, unnest(string_split(text, ', ')) AS text
-    FROM listed
 ),
 counted AS (
     SELECT
         label_group, topic_name, subscriber, name,
-        regexp_extract(text, '^(.*) \d+$', 1) AS reason,
-        sum(regexp_extract(text, ' (\d+)$', 1)::BIGINT) AS number
-    FROM part
+        entry.key AS reason,
+        sum(entry.value)::BIGINT AS number
+    FROM listed
     GROUP BY label_group, topic_name, subscriber, name, reason
 )
 SELECT
     label_group, topic_name, subscriber, name,
-    string_agg(reason || ' ' || number, ', ' ORDER BY number DESC, reason) AS text
+    map(
+        list(reason ORDER BY number DESC, reason), list(number ORDER BY number DESC, reason)
+    ) AS numbers
 FROM counted
 GROUP BY label_group, topic_name, subscriber, name

@@ -8,10 +8,9 @@
 -- severity: info
 -- when: staging.callback_run WHERE is_agnocast
 SELECT
-    l.label AS subject,
+    p.process_id,
     count(*) AS count,
     printf('%d callbacks on %d threads', count(*), count(DISTINCT p.thread_id)) AS detail
 FROM staging.callback_run AS p
-JOIN process_label AS l ON p.process_id = l.process_id
 WHERE p.is_agnocast
-GROUP BY p.process_id, l.label
+GROUP BY p.process_id

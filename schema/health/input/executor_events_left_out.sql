@@ -25,9 +25,8 @@ WITH left_out AS (
     HAVING count(*) > 1
 )
 SELECT
-    l.label AS subject,
+    process_id,
     count(*) AS count,
     'nothing shows when its threads waited for work' AS detail
-FROM left_out AS o
-JOIN process_label AS l ON o.process_id = l.process_id
-GROUP BY o.process_id, l.label
+FROM left_out
+GROUP BY process_id

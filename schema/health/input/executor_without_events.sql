@@ -39,7 +39,7 @@ running AS (
     GROUP BY process_id
 )
 SELECT
-    l.label AS subject,
+    s.process_id,
     sum(s.number)::BIGINT AS count,
     printf(
         '%d callbacks on %d of %d threads, and no event of an executor',
@@ -47,5 +47,4 @@ SELECT
     ) AS detail
 FROM silent AS s
 JOIN running AS t ON s.process_id = t.process_id
-JOIN process_label AS l ON s.process_id = l.process_id
-GROUP BY s.process_id, l.label
+GROUP BY s.process_id

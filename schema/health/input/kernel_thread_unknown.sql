@@ -7,7 +7,7 @@
 -- severity: info
 -- when: staging.schedule
 SELECT
-    coalesce(p.name, 'process ' || p.pid) AS subject,
+    p.process_id,
     count(*) AS count,
     printf(
         '%d threads of %s (pid %d) are not known to the kernel trace: no states of them',

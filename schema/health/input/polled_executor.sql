@@ -9,14 +9,13 @@
 -- severity: warning
 -- when: staging.executor_first WHERE polls > 1
 SELECT
-    l.label AS subject,
+    t.process_id,
     sum(f.polls)::BIGINT AS count,
     printf(
         'polled %d times, of %d waits in all', sum(f.polls)::BIGINT, sum(f.waits)::BIGINT
     ) AS detail
 FROM staging.executor_first AS f
 JOIN staging.thread AS t ON f.thread_id = t.thread_id
-JOIN process_label AS l ON t.process_id = l.process_id
 -- Any program may poll once before it spins.
 WHERE f.polls > 1 AND 2 * f.polls > f.waits
-GROUP BY t.process_id, l.label
+GROUP BY t.process_id

@@ -42,12 +42,16 @@ timed AS (SELECT process_id, count(*) AS number FROM staging.timer GROUP BY proc
 -- One of rclcpp that was there before the recording may only have logged. Of rclpy all processes
 -- have one name, so that only their nodes tell them apart.
 named AS (
-    SELECT process_id, string_agg(full_name, ', ' ORDER BY node_id) AS nodes
+    SELECT
+        process_id,
+        string_agg(full_name, ', ' ORDER BY node_id) AS nodes,
+        CASE WHEN count(*) = 1 THEN min(node_id) END AS node_id
     FROM staging.node
     WHERE NOT is_inferred
     GROUP BY process_id
 )
 SELECT
+    s.process_id, n.node_id,
     printf('%s (%s)', n.nodes, l.label) AS subject,
     s.number AS count,
     printf('publications: %d, timers: %d, callbacks: none', s.number, coalesce(t.number, 0))

@@ -21,17 +21,14 @@ WITH output AS (
     HAVING doubted > 0
 )
 SELECT
-    l.run_id,
-    main.node_label(n.full_name, p.name, p.pid) AS subject,
-    sum(l.doubted)::BIGINT AS count,
+    run_id, process_id, node_id,
+    sum(doubted)::BIGINT AS count,
     string_agg(
         printf(
             '%d of %s that led to %s may be others',
-            l.doubted, derive.counted(l.links, 'message'), coalesce(l.topic_name, '?')
+            doubted, derive.counted(links, 'message'), coalesce(topic_name, '?')
         ),
-        ', ' ORDER BY l.topic_name, l.doubted
+        ', ' ORDER BY topic_name, doubted
     ) AS detail
-FROM output AS l
-JOIN store.process AS p ON l.process_id = p.process_id
-LEFT JOIN store.node AS n ON l.node_id = n.node_id
-GROUP BY l.run_id, l.node_id, n.full_name, p.process_id, p.name, p.pid
+FROM output
+GROUP BY run_id, process_id, node_id

@@ -7,8 +7,7 @@
 -- severity: warning
 -- when: store.link_transport WHERE candidate_count > 1
 SELECT
-    l.run_id,
-    main.node_label(n.full_name, p.name, p.pid) AS subject,
+    l.run_id, s.process_id, s.node_id,
     count(*) AS count,
     printf(
         '%s on %s may be of other publications',
@@ -17,7 +16,5 @@ SELECT
     ) AS detail
 FROM store.link_transport AS l
 LEFT JOIN store.subscription AS s ON l.subscription_id = s.subscription_id
-LEFT JOIN store.process AS p ON s.process_id = p.process_id
-LEFT JOIN store.node AS n ON s.node_id = n.node_id
 WHERE l.candidate_count > 1
-GROUP BY l.run_id, s.node_id, n.full_name, p.process_id, p.name, p.pid
+GROUP BY l.run_id, s.process_id, s.node_id

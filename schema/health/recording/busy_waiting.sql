@@ -40,8 +40,7 @@ ran AS (
     GROUP BY x.executor_id
 )
 SELECT
-    w.run_id,
-    printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
+    w.run_id, e.process_id,
     w.number AS count,
     printf(
         '%d short waits for %s on %s: %d for each',
@@ -51,8 +50,6 @@ SELECT
 FROM waited AS w
 JOIN ran AS r ON w.executor_id = r.executor_id
 JOIN main.executor AS e ON w.executor_id = e.executor_id
-JOIN main.process AS p ON e.process_id = p.process_id
-JOIN main.host AS h ON p.host_id = h.host_id
 -- One that sleeps until a callback is due waits once for it, or a few times: it is woken for what
 -- it does for itself, too. One that is busy waits twenty times and more.
 WHERE w.number > 10 * r.number

@@ -35,7 +35,7 @@ missed AS (
     GROUP BY z.clock_id, z.segment
 )
 SELECT
-    z.run_id, h.hostname AS subject,
+    z.run_id, h.host_id,
     coalesce(m.number, 0) AS count,
     printf(
         '%+.3f ms between %.3f s and %.3f s after recording began',

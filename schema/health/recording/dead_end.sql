@@ -8,24 +8,18 @@
 --     declares them at once. Where a node only consumes messages, an entry of kind independent says
 --     so (docs/links.md).
 -- next: suggest links
--- grain: one row per node
+-- grain: one row per node and topic
 -- severity: warning
 -- when: derive.unanswered_subscription
 WITH dead_end AS MATERIALIZED (FROM main.dead_end([$run_id])),
 input AS (
-    SELECT
-        node_id,
-        sum(message_count) AS number,
-        string_agg(
-            printf('%s on %s', derive.counted(message_count, 'message'), topic_name), ' and '
-            ORDER BY topic_name, subscription_id
-        ) AS received
+    SELECT node_id, topic_name, sum(message_count)::BIGINT AS number
     FROM (
         SELECT DISTINCT node_id, subscription_id, topic_name, message_count
         FROM dead_end
         WHERE is_likely
     )
-    GROUP BY node_id
+    GROUP BY node_id, topic_name
 ),
 output AS (
     SELECT node_id, derive.first_three(published) AS published
@@ -38,12 +32,12 @@ output AS (
     GROUP BY node_id
 )
 SELECT
-    n.run_id,
-    main.node_label(n.full_name, p.name, p.pid) AS subject,
-    i.number::BIGINT AS count,
+    n.run_id, i.node_id, i.topic_name,
+    i.number AS count,
     printf(
-        '%s end at %s, which publishes %s: msgflow suggest links',
-        i.received, main.node_label(n.full_name, p.name, p.pid), o.published
+        '%s on %s end at %s, which publishes %s: msgflow suggest links',
+        derive.counted(i.number, 'message'), i.topic_name,
+        main.node_label(n.full_name, p.name, p.pid), o.published
     ) AS detail
 FROM input AS i
 JOIN output AS o ON i.node_id = o.node_id

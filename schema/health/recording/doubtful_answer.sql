@@ -26,17 +26,14 @@ WITH pair AS (
     GROUP BY ALL
 )
 SELECT
-    a.run_id,
-    main.node_label(n.full_name, o.name, o.pid) AS subject,
-    sum(a.link_count)::BIGINT AS count,
+    run_id, process_id, node_id,
+    sum(link_count)::BIGINT AS count,
     string_agg(
         printf(
-            '%s after %s (%s)', coalesce(a.output, '?'), coalesce(a.input, '?'),
-            derive.counted(a.link_count, 'publication')
+            '%s after %s (%s)', coalesce(output, '?'), coalesce(input, '?'),
+            derive.counted(link_count, 'publication')
         ),
-        ', ' ORDER BY a.output, a.input, a.link_count
+        ', ' ORDER BY output, input, link_count
     ) AS detail
-FROM pair AS a
-JOIN store.process AS o ON a.process_id = o.process_id
-LEFT JOIN store.node AS n ON a.node_id = n.node_id
-GROUP BY a.run_id, a.node_id, n.full_name, o.name, o.pid
+FROM pair
+GROUP BY run_id, process_id, node_id

@@ -42,8 +42,7 @@ priority AS (
     GROUP BY thread_id
 )
 SELECT
-    s.run_id,
-    printf('%s %d on %s', coalesce(t.name, '?'), t.tid, h.hostname) AS subject,
+    s.run_id, s.thread_id,
     s.number AS count,
     printf(
         'another thread had the CPU for %.3f s of %.3f s in which callbacks had work to do '
@@ -52,9 +51,6 @@ SELECT
         100 * s.preempted_ns / (s.running_ns + s.preempted_ns), f.name
     ) AS detail
 FROM spent AS s
-JOIN main.thread AS t ON s.thread_id = t.thread_id
-JOIN main.process AS p ON t.process_id = p.process_id
-JOIN main.host AS h ON p.host_id = h.host_id
 JOIN priority AS k ON s.thread_id = k.thread_id
 JOIN first AS f ON s.thread_id = f.thread_id
 WHERE 10 * s.preempted_ns > s.running_ns + s.preempted_ns

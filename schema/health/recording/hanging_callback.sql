@@ -25,7 +25,7 @@ usual AS (
     GROUP BY callback_id
 )
 SELECT
-    c.run_id,
+    c.run_id, c.thread_id, b.node_id, s.topic_name,
     l.node || ' ' || l.label AS subject,
     1 AS count,
     printf(
@@ -44,6 +44,8 @@ JOIN main.callback_label AS l ON c.callback_id = l.callback_id
 JOIN store.thread AS h ON c.thread_id = h.thread_id
 JOIN store.process AS p ON c.process_id = p.process_id
 JOIN host_end AS e ON p.host_id = e.host_id
+JOIN store.callback AS b ON c.callback_id = b.callback_id
+LEFT JOIN store.subscription AS s ON b.subscription_id = s.subscription_id
 LEFT JOIN usual AS u ON c.callback_id = u.callback_id
 WHERE e.end_ns - h.last_seen_ns > 500_000_000
     AND e.end_ns - c.start_ns > 10 * coalesce(u.longest_ns, 0)

@@ -10,11 +10,7 @@
 -- grain: one row per process
 -- severity: warning
 -- when: store.gap
-SELECT
-    p.run_id,
-    printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
-    u.count, u.detail
+SELECT p.run_id, u.process_id, u.count, u.detail
 FROM derive.unseen_creation AS u
 JOIN main.process AS p ON u.process_id = p.process_id
-JOIN main.host AS h ON p.host_id = h.host_id
 WHERE u.is_lossy

@@ -29,7 +29,7 @@ WITH seen AS MATERIALIZED (
     FROM store.run
     WHERE run_id = $run_id
 )
-SELECT $run_id AS run_id, 'everything' AS subject, 1::BIGINT AS count,
+SELECT $run_id AS run_id, 'everything' AS layer, 1::BIGINT AS count,
     'nothing was published or taken and no callback ran, as far as traced: no answers' AS detail
 FROM seen
 WHERE NOT (has_publications OR has_takes OR has_callbacks)

@@ -10,6 +10,9 @@
 -- grain: one row per topic, publishing node and subscribing node
 -- severity: warning
 -- when: store.undelivered WHERE reason = 'never_taken'
-SELECT run_id, subject, number AS count, printf('none of %s was taken', messages) AS detail
+SELECT
+    run_id, node_id, publishing_node_id, topic_name, subject,
+    number AS count,
+    printf('none of %s was taken', messages) AS detail
 FROM untaken_pair
 WHERE reason = 'never_taken'

@@ -10,7 +10,10 @@
 -- grain: one row per topic, publishing node and subscribing node
 -- severity: warning
 -- when: store.undelivered WHERE reason = 'no_longer_taken'
-SELECT run_id, subject, number AS count, printf('none of the last %s was taken', messages) AS detail
+SELECT
+    run_id, node_id, publishing_node_id, topic_name, subject,
+    number AS count,
+    printf('none of the last %s was taken', messages) AS detail
 FROM untaken_pair
 -- A single message may get lost at any time.
 WHERE reason = 'no_longer_taken' AND number > 1

@@ -11,10 +11,12 @@
 -- when: store.undelivered WHERE reason IN ('not_delivered', 'lost_in_transport')
 WITH pair AS (
     SELECT
-        run_id, subject, sum(number)::BIGINT AS untaken, flatten(list(pairs)) AS pairs,
+        run_id, node_id, publishing_node_id, topic_name, subject,
+        sum(number)::BIGINT AS untaken,
+        flatten(list(pairs)) AS pairs,
         sum(number) FILTER (reason IN ('not_delivered', 'lost_in_transport'))::BIGINT AS missing
     FROM untaken_pair
-    GROUP BY run_id, subject
+    GROUP BY run_id, node_id, publishing_node_id, topic_name, subject
 ),
 taken AS (
     SELECT publisher_id, subscription_id, count(*) AS number
@@ -22,13 +24,14 @@ taken AS (
     GROUP BY publisher_id, subscription_id
 ),
 counted AS (
-    SELECT p.run_id, p.subject, p.missing, p.untaken, sum(t.number)::BIGINT AS taken
+    SELECT p.* EXCLUDE (pairs), sum(t.number)::BIGINT AS taken
     FROM pair AS p
     JOIN taken AS t ON list_contains(p.pairs, (t.publisher_id, t.subscription_id))
-    GROUP BY p.run_id, p.subject, p.missing, p.untaken
+    GROUP BY ALL
 )
 SELECT
-    run_id, subject, missing AS count,
+    run_id, node_id, publishing_node_id, topic_name, subject,
+    missing AS count,
     printf(
         '%d of %d messages reached it (%.0f %%)',
         taken, taken + untaken, 100 * taken / (taken + untaken)

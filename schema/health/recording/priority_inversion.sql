@@ -41,15 +41,11 @@ delay AS (
     GROUP BY a.run_id, a.thread_id, a.start_ns
 )
 SELECT
-    d.run_id,
-    printf('%s %d on %s', coalesce(t.name, '?'), t.tid, h.hostname) AS subject,
+    run_id, thread_id,
     count(*) AS count,
     printf(
         'delayed %s by less urgent threads, %.3f ms in all, %.3f ms at most',
-        derive.counted(count(*), 'time'), sum(d.length_ns) / 1e6, max(d.length_ns) / 1e6
+        derive.counted(count(*), 'time'), sum(length_ns) / 1e6, max(length_ns) / 1e6
     ) AS detail
-FROM delay AS d
-JOIN main.thread AS t ON d.thread_id = t.thread_id
-JOIN main.process AS p ON t.process_id = p.process_id
-JOIN main.host AS h ON p.host_id = h.host_id
-GROUP BY d.run_id, d.thread_id, t.name, t.tid, h.hostname
+FROM delay
+GROUP BY run_id, thread_id

@@ -25,21 +25,18 @@ announced AS (
 ),
 host_end AS (SELECT host_id, max(last_seen_ns) AS end_ns FROM store.process GROUP BY host_id)
 SELECT
-    p.run_id,
-    printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
+    p.run_id, p.process_id,
     m.number AS count,
     printf(
         'silent for the last %.3f s, in which %s came',
-        (e.end_ns - q.last_seen_ns) / 1e9, derive.counted(m.number, 'message')
+        (e.end_ns - p.last_seen_ns) / 1e9, derive.counted(m.number, 'message')
     ) AS detail
 FROM missed AS m
 JOIN announced AS a ON m.process_id = a.process_id
-JOIN main.process AS p ON m.process_id = p.process_id
 -- As recorded: a correction of the clocks moves the times of main.process alone.
-JOIN store.process AS q ON m.process_id = q.process_id
-JOIN main.host AS h ON p.host_id = h.host_id
+JOIN store.process AS p ON m.process_id = p.process_id
 JOIN host_end AS e ON p.host_id = e.host_id
 -- LTTng stops one stream after the other, which takes 0.2 s at most.
-WHERE e.end_ns - q.last_seen_ns > 500_000_000
+WHERE e.end_ns - p.last_seen_ns > 500_000_000
     -- Real processes had no other event more than 4 ms after their goodbye; CPUs may be busy.
-    AND q.last_seen_ns - a.last_ns > 100_000_000
+    AND p.last_seen_ns - a.last_ns > 100_000_000

@@ -8,13 +8,11 @@
 -- severity: warning
 -- when: store.process WHERE process_id NOT IN (SELECT process_id FROM store.node)
 SELECT
-    p.run_id,
-    printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
+    run_id, process_id,
     1::BIGINT AS count,
-    printf('seen for %.3f s', (p.last_seen_ns - p.first_seen_ns) / 1e9) AS detail
-FROM main.process AS p
-JOIN main.host AS h ON p.host_id = h.host_id
-WHERE p.process_id NOT IN (
+    printf('seen for %.3f s', (last_seen_ns - first_seen_ns) / 1e9) AS detail
+FROM main.process
+WHERE process_id NOT IN (
     SELECT process_id FROM main.node
     UNION ALL
     SELECT process_id FROM main.publisher

@@ -13,7 +13,7 @@
 -- when: store.nearest_message
 SELECT
     $run_id AS run_id,
-    p.topic_name AS subject,
+    p.topic_name,
     count(*) AS count,
     derive.counted(count(*), 'publication') AS detail
 FROM derive.unstamped_call($run_id) AS b

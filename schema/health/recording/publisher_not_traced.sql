@@ -10,7 +10,7 @@
 -- severity: warning
 -- when: store.orphan_take WHERE reason = 'publisher_not_traced'
 SELECT
-    o.run_id,
+    o.run_id, s.topic_name,
     coalesce(s.topic_name, 'unknown topic') AS subject,
     count(*) AS count,
     derive.counted(count(*), 'message') AS detail

@@ -26,7 +26,7 @@ WITH silent AS (
     GROUP BY b.run_id, b.topic_name
 )
 SELECT
-    o.run_id, s.topic_name AS subject,
+    o.run_id, s.topic_name,
     count(*) AS count,
     printf('%s, and no publication of %s', derive.counted(count(*), 'message'), l.labels) AS detail
 FROM store.orphan_take AS o

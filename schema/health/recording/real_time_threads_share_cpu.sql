@@ -45,7 +45,7 @@ placed AS (
     )
 )
 SELECT
-    a.run_id,
+    a.run_id, a.host_id,
     printf('CPU %d of %s', a.cpu, h.hostname) AS subject,
     count(*) AS count,
     printf(
@@ -56,4 +56,4 @@ SELECT
 FROM placed AS a
 JOIN main.thread AS t ON a.thread_id = t.thread_id
 JOIN main.host AS h ON a.host_id = h.host_id
-GROUP BY a.run_id, h.host_id, h.hostname, a.cpu
+GROUP BY a.run_id, a.host_id, h.hostname, a.cpu

@@ -19,8 +19,7 @@ WITH served AS (
     HAVING count(callback_instance_id) = 0
 )
 SELECT
-    p.run_id,
-    printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
+    s.run_id, v.process_id,
     sum(v.number)::BIGINT AS count,
     printf(
         '%s of %s', derive.counted(sum(v.number), 'request'),
@@ -28,8 +27,6 @@ SELECT
     ) AS detail
 FROM served AS v
 JOIN store.service AS s ON v.service_id = s.service_id
-JOIN main.process AS p ON v.process_id = p.process_id
-JOIN main.host AS h ON p.host_id = h.host_id
 WHERE v.process_id IN (SELECT process_id FROM store.callback)
     AND contains(s.service_name, '/_action/')
-GROUP BY p.run_id, p.process_id, p.name, p.pid, h.hostname
+GROUP BY s.run_id, v.process_id

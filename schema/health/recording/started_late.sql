@@ -12,11 +12,7 @@
 --     store.subscription WHERE is_inferred AND NOT is_internal,
 --     store.timer WHERE created_ns IS NULL, store.service WHERE created_ns IS NULL,
 --     store.client WHERE created_ns IS NULL, store.callback WHERE created_ns IS NULL
-SELECT
-    p.run_id,
-    printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
-    u.count, u.detail
+SELECT p.run_id, u.process_id, u.count, u.detail
 FROM derive.unseen_creation AS u
 JOIN main.process AS p ON u.process_id = p.process_id
-JOIN main.host AS h ON p.host_id = h.host_id
 WHERE NOT u.is_lossy

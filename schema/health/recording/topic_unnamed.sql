@@ -11,7 +11,7 @@
 -- when: store.publisher WHERE topic_name IS NULL OR is_topic_learned OR is_topic_declared,
 --     store.subscription WHERE topic_name IS NULL OR is_topic_learned OR is_topic_declared
 SELECT
-    run_id,
+    run_id, node_id, publishing_node_id,
     CASE WHEN publishers IS NULL THEN 'to ' || subscribers
         WHEN subscribers IS NULL THEN 'from ' || publishers
         ELSE publishers || ' → ' || subscribers END AS subject,

@@ -28,7 +28,7 @@ sender AS (
     GROUP BY b.run_id, b.topic_name
 )
 SELECT
-    l.run_id,
+    l.run_id, l.topic_name,
     coalesce(l.topic_name, 'unknown topic') AS subject,
     l.number AS count,
     printf(

@@ -10,7 +10,7 @@
 -- severity: warning
 -- when: store.callback_instance WHERE end_ns IS NULL
 WITH unended AS (
-    SELECT callback_instance_id, callback_id, process_id, thread_id, start_ns
+    SELECT run_id, callback_instance_id, callback_id, process_id, thread_id, start_ns
     FROM main.callback_instance
     WHERE end_ns IS NULL AND NOT is_loss_affected
 ),
@@ -35,13 +35,10 @@ cut AS (
     WHERE coalesce(b.resumed_ns <= n.start_ns, n.start_ns IS NULL)
 )
 SELECT
-    p.run_id,
-    printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname) AS subject,
+    i.run_id, i.process_id,
     count(*) AS count,
     derive.counted(count(*), 'run') || ' of '
     || derive.counted(count(DISTINCT i.callback_id), 'callback') AS detail
 FROM open AS i
 ANTI JOIN cut AS c ON i.callback_instance_id = c.callback_instance_id
-JOIN main.process AS p ON i.process_id = p.process_id
-JOIN main.host AS h ON p.host_id = h.host_id
-GROUP BY p.run_id, p.process_id, p.name, p.pid, h.hostname
+GROUP BY i.run_id, i.process_id

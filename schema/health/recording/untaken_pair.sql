@@ -3,7 +3,7 @@
 --     are, in words and by their ids, and how many messages.
 -- grain: one row per topic, publishing node, subscribing node and reason
 SELECT
-    u.run_id, u.reason,
+    u.run_id, u.reason, s.topic_name, p.node_id AS publishing_node_id, s.node_id,
     printf(
         '%s: %s (%s %d) → %s (%s %d)', s.topic_name,
         coalesce(pn.full_name, '?'), coalesce(pp.name, '?'), pp.pid,
@@ -23,4 +23,4 @@ JOIN store.subscription AS s ON u.subscription_id = s.subscription_id
 JOIN store.process AS sp ON s.process_id = sp.process_id
 LEFT JOIN store.node AS sn ON s.node_id = sn.node_id
 WHERE NOT s.is_internal
-GROUP BY u.run_id, u.reason, subject
+GROUP BY u.run_id, u.reason, s.topic_name, p.node_id, s.node_id, subject

@@ -12,7 +12,8 @@ doubt AS (
             '{}: {}, and flows through it with them. {}', f.subject, f.detail, rtrim(f.cure, '.')
         ) AS sentence
     FROM main.finding AS f
-    SEMI JOIN place AS p ON f.subject = p.name
+    JOIN main.node AS n ON f.node_id = n.node_id
+    SEMI JOIN place AS p ON n.full_name = p.name
     WHERE list_contains($runs, f.run_id) AND f.name IN ('ambiguous_cause', 'ambiguous_link')
 )
 SELECT sentence

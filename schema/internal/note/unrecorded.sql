@@ -11,7 +11,7 @@ WITH lacking AS (
     FROM main.finding AS f
     JOIN main.run AS r ON f.run_id = r.run_id
     WHERE $note IN ('requests', 'goals') AND list_contains($runs, f.run_id)
-        AND f.name = 'missing_layer' AND f.subject = $note
+        AND f.name = 'missing_layer' AND f.layer = $note
     UNION ALL
     SELECT 0, 'the kernel was not traced: msgflow record --kernel, see docs/scheduling.md'
     WHERE $note = 'kernel'

@@ -1,13 +1,17 @@
 -- description: Of some callbacks the one with most samples, and the three functions in which most
 --     of these were.
 -- grain: one row per function
+-- when: main.stack_sample WHERE list_contains($runs, run_id)
+-- next: query functions --node {node} --callback {callback}
 -- param: callbacks VARCHAR[][]  Node of each, and what triggers it
+-- column: node VARCHAR  Node
+-- column: callback VARCHAR  What triggers the callback
 WITH sampled AS (
     SELECT l.node, l.label AS callback, s.stack_id, s.cpu_ns
     FROM main.stack_sample AS s
     JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-    WHERE s.run_id = $run_id AND list_contains($callbacks, [l.node, l.label])
+    WHERE list_contains($runs, s.run_id) AND list_contains($callbacks, [l.node, l.label])
         AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
 ),
 longest AS (

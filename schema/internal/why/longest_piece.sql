@@ -3,7 +3,7 @@
 --     them the sum of all others. It has the columns of its input.
 -- grain: one row per piece
 -- reads: slow_flow
--- param: count BIGINT  How many pieces
+-- param: count BIGINT = 5  How many pieces
 WITH piece AS (SELECT *, row_number() OVER () AS place FROM slow_flow),
 longest AS (
     SELECT *

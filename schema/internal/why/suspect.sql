@@ -14,6 +14,8 @@
 -- column: cost_ns BIGINT [ns]  By how much
 -- column: matters BOOLEAN  It is enough to be told
 -- column: clause VARCHAR  What is to be said of the culprit
+-- column: lacks VARCHAR  What was not recorded that would tell whether it is so: 'kernel' or
+--     'callbacks'
 WITH span AS (
     SELECT
         run_id, least(end_ns, $end_ns) - greatest(start_ns, $start_ns) AS length_ns,
@@ -163,9 +165,9 @@ late AS (
     LEFT JOIN (
         SELECT
             subscriber, sum(published) AS published, string_agg(topic_name, ', ') AS topic_name,
-            sum(regexp_extract(reasons, 'before_subscription (\d+)', 1)::BIGINT) AS missed
+            sum(reasons['before_subscription'])::BIGINT AS missed
         FROM delivery
-        WHERE reasons LIKE '%before_subscription%'
+        WHERE reasons['before_subscription'] > 0
         GROUP BY subscriber
     ) AS d
         ON c.full_name = d.subscriber
@@ -211,10 +213,7 @@ sampled AS (
 awake AS (
     SELECT n.full_name AS node, min(f.detail) AS detail
     FROM store.finding AS f
-    JOIN main.process AS p
-        ON f.run_id = p.run_id
-        AND starts_with(f.subject, printf('%s %d on ', coalesce(p.name, '?'), p.pid))
-    JOIN main.node AS n ON p.process_id = n.process_id
+    JOIN main.node AS n ON f.process_id = n.process_id
     WHERE f.name = 'busy_waiting' AND list_contains($runs, f.run_id)
     GROUP BY n.full_name
 ),
@@ -258,10 +257,10 @@ SELECT
         ELSE '' END
     || CASE WHEN is_unusual
         THEN printf(
-            ', usually %s: it ran, or was kept from the CPU (not known without a kernel trace)',
-            main.duration_text(usual_ns)
+            ', usually %s: it ran, or was kept from the CPU', main.duration_text(usual_ns)
         )
-        ELSE '' END AS clause
+        ELSE '' END AS clause,
+    CASE WHEN is_unusual THEN 'kernel' END AS lacks
 FROM computing
 UNION ALL
 SELECT
@@ -286,11 +285,12 @@ SELECT
     || CASE WHEN o.is_supposed THEN ', if one callback group has both' ELSE '' END
     || CASE WHEN greatest(h.run_ns, o.other_run_ns) > 3 * h.usual_ns AND NOT o.has_kernel
         THEN printf(
-            '; usually it takes %s: it ran, or was kept from the CPU (not known without a kernel'
-            || ' trace)',
+            '; usually it takes %s: it ran, or was kept from the CPU',
             main.duration_text(h.usual_ns)
         )
-        ELSE '' END
+        ELSE '' END,
+    CASE WHEN greatest(h.run_ns, o.other_run_ns) > 3 * h.usual_ns AND NOT o.has_kernel
+        THEN 'kernel' END
 FROM other AS o
 JOIN holding AS h ON o.callback_id = h.callback_id
 UNION ALL
@@ -306,7 +306,8 @@ SELECT
             'takes the CPU from %s, which waits for it for %s of %s', node,
             main.duration_text(cpu_ns), main.duration_text(path_ns)
         )
-    END
+    END,
+    NULL
 FROM callback
 WHERE cpu_ns > 0
 UNION ALL
@@ -324,7 +325,8 @@ SELECT
         ELSE ', as far as times show (requests are recorded since Kilted)' END
     || CASE WHEN queued_ns > 0.2 * call_ns
         THEN printf(', and further messages wait for that for %s', main.duration_text(queued_ns))
-        ELSE '' END
+        ELSE '' END,
+    NULL
 FROM callback
 WHERE call_ns > 0
 UNION ALL
@@ -336,21 +338,24 @@ SELECT
         coalesce(queue_depth::VARCHAR, 'unknown depth'), dropped, known, coalesce(topic_name, '?')
     )
     -- A single message has no rate.
-    || coalesce(printf(' (%.3g Hz come in, %.3g Hz are taken)', in_hz, out_hz), '')
+    || coalesce(printf(' (%.3g Hz come in, %.3g Hz are taken)', in_hz, out_hz), ''),
+    NULL
 FROM failed
 WHERE dropped > 0
 UNION ALL
 SELECT
     'lost', subscriber, topic_name, path, (lost / known * 1e9 / in_hz)::BIGINT,
     lost >= 3 AND lost >= 0.02 * known,
-    printf('%d of %d messages on %s were lost on the way', lost, known, coalesce(topic_name, '?'))
+    printf('%d of %d messages on %s were lost on the way', lost, known, coalesce(topic_name, '?')),
+    NULL
 FROM failed
 WHERE lost > 0
 UNION ALL
 SELECT
     'late_start', node, topic_name, path, cost_ns, true,
     printf('started %s after the others', main.duration_text(cost_ns))
-    || coalesce(printf(' and missed %d of %d messages on %s', missed, published, topic_name), '')
+    || coalesce(printf(' and missed %d of %d messages on %s', missed, published, topic_name), ''),
+    NULL
 FROM late
 UNION ALL
 SELECT
@@ -361,7 +366,8 @@ SELECT
         ELSE printf('its %s may use what it was told before: messages come %s'
             || ' (msgflow suggest links)',
             what, inputs)
-    END
+    END,
+    NULL
 FROM sampled
 UNION ALL
 SELECT
@@ -374,14 +380,17 @@ SELECT
                 THEN 'messages on %s wait for %s of %s, while its executor looks for work again and'
                 || ' again: '
             WHEN NOT m.is_traced
-                THEN 'messages on %s are on the way, or wait in its queue, for %s of %s (not known'
-                || ' without its callbacks)'
+                THEN 'messages on %s are on the way, or wait in its queue, for %s of %s'
             WHEN m.has_kernel THEN 'messages on %s are on the way for %s of %s'
-            ELSE 'messages on %s are on the way, or its thread has no CPU, for %s of %s (not known'
-                || ' without a kernel trace)'
+            ELSE 'messages on %s are on the way, or its thread has no CPU, for %s of %s'
         END,
         m.topic, main.duration_text(m.cost_ns), main.duration_text(m.path_ns)
     )
-    || coalesce(a.detail || ' (msgflow check)', '')
+    || coalesce(a.detail || ' (msgflow check)', ''),
+    CASE
+        WHEN a.detail IS NOT NULL THEN NULL
+        WHEN NOT m.is_traced THEN 'callbacks'
+        WHEN NOT m.has_kernel THEN 'kernel'
+    END
 FROM moving AS m
 LEFT JOIN awake AS a ON m.node = a.node

@@ -12,27 +12,28 @@
 --     half of that where it only may be so; NULL: of findings
 -- column: path VARCHAR [path]  Path that it delays most: of equal ones the first by name
 -- column: sentence VARCHAR  The sentence
+-- column: lacks VARCHAR[]  What was not recorded that would tell whether it is so: 'kernel',
+--     'callbacks'
 WITH step AS (
-    SELECT DISTINCT unnest(string_split(path, ' → ')) AS name FROM path_row
-),
-known AS (
-    SELECT full_name AS name FROM main.node WHERE list_contains($runs, run_id)
-    UNION ALL
-    SELECT topic_name FROM main.subscription WHERE list_contains($runs, run_id)
+    SELECT list_distinct(flatten(list(string_split(path, ' → ')))) AS names FROM path_row
 ),
 -- Of these paths, or of the recording as a whole.
 touching AS (
     SELECT
         f.name, f.title, f.subject, f.detail,
         row_number() OVER (ORDER BY f.severity, f.name, f.subject, f.detail) AS place
-    FROM (SELECT *, regexp_extract_all(subject, '/[\w/]+') AS names FROM main.finding) AS f
+    FROM main.finding AS f
+    LEFT JOIN main.node AS n ON f.node_id = n.node_id
+    LEFT JOIN main.node AS p ON f.publishing_node_id = p.node_id
     WHERE list_contains($runs, f.run_id)
         AND f.severity IN ('error', 'warning')
         -- The verdict has sentences of its own for these, or they delay nothing by themselves.
         AND f.name NOT IN ('dead_end', 'executor_preempted', 'busy_waiting')
         AND (
-            list_has_any(f.names, (SELECT list(name) FROM step))
-            OR NOT list_has_any(f.names, (SELECT list(name) FROM known))
+            coalesce(f.topic_name, n.full_name, p.full_name) IS NULL
+            OR list_has_any(
+                (SELECT names FROM step), [f.topic_name, n.full_name, p.full_name]
+            )
         )
 ),
 found AS (
@@ -52,10 +53,15 @@ found AS (
 chosen AS (
     SELECT
         kind, who, what, arg_min(path, (-cost_ns, path)) AS path, max(cost_ns) AS cost_ns,
-        arg_min(clause, (-cost_ns, path)) AS clause
+        unnest(arg_min({'clause': clause, 'lacks': lacks}, (-cost_ns, path, clause)))
     FROM (
         SELECT
-            kind, coalesce(who, '?') AS who, what, path, coalesce(cost_ns, 0) AS cost_ns, clause
+            kind, coalesce(who, '?') AS who, what, path, coalesce(cost_ns, 0) AS cost_ns, lacks,
+            clause || CASE lacks
+                WHEN 'kernel' THEN ' (not known without a kernel trace)'
+                WHEN 'callbacks' THEN ' (not known without its callbacks)'
+                ELSE ''
+            END AS clause
         FROM suspect
         WHERE matters AND clause IS NOT NULL
     )
@@ -74,7 +80,8 @@ told AS (
         max(cost_ns) AS cost_ns,
         arg_min(path, (-cost_ns, kind, what)) AS path,
         printf('%s: %s', who, string_agg(clause, '; ' ORDER BY cost_ns DESC, kind, what))
-            AS sentence
+            AS sentence,
+        coalesce(list(DISTINCT lacks ORDER BY lacks) FILTER (lacks IS NOT NULL), []) AS lacks
     FROM chosen
     GROUP BY who
 ),
@@ -88,11 +95,12 @@ slowest AS (
 said AS (
     SELECT
         place, subject AS who, [name] AS kinds, NULL::BIGINT AS cost_ns,
-        NULL::VARCHAR AS path, sentence
+        NULL::VARCHAR AS path, sentence, []::VARCHAR[] AS lacks
     FROM found
     UNION ALL
     SELECT
-        1e6 + row_number() OVER (ORDER BY cost_ns DESC, who), who, kinds, cost_ns, path, sentence
+        1e6 + row_number() OVER (ORDER BY cost_ns DESC, who), who, kinds, cost_ns, path,
+        sentence, lacks
     FROM told
     UNION ALL
     SELECT
@@ -102,12 +110,13 @@ said AS (
             || ' longest on it is %s of %s, with up to %s',
             main.duration_text(s.p95_ns), coalesce(b.what, '?'), coalesce(b.node, '?'),
             main.duration_text(b.p95_ns)
-        )
+        ),
+        []
     FROM slowest AS s
     JOIN breakdown AS b ON s.path = b.path
     WHERE NOT EXISTS (FROM told)
     QUALIFY row_number() OVER (ORDER BY b.total_ns DESC, b.hop) = 1
 )
-SELECT who, kinds, cost_ns, path, sentence
+SELECT who, kinds, cost_ns, path, sentence, lacks
 FROM said
 ORDER BY place
