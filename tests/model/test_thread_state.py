@@ -339,10 +339,10 @@ def test_a_thread_that_nothing_tells_is_said(system: RosSystem, analyse: Analyse
     call(system, 800, 810, Thread(100, 101))
     model = analyse(system)
     assert model.rows(
-        "SELECT subject, count, detail FROM store.finding WHERE name = 'kernel_thread_unknown'"
+        "SELECT process_id, count, detail FROM store.finding WHERE name = 'kernel_thread_unknown'"
     ) == [
         (
-            "main",
+            1,
             1,
             "1 threads of main (pid 100) are not known to the kernel trace: no states of them",
         )

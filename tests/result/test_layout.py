@@ -22,7 +22,13 @@ SCREENS = Path(__file__).parent / "screens"
 BEGIN = 1_700_000_000_000_000_000
 RUN = Run(1, "morning", BEGIN)
 OTHER = Run(2, "evening", BEGIN + 10**12)
-TYPES = {"BIGINT": pa.int64(), "INTEGER": pa.int32(), "DOUBLE": pa.float64(), "BOOLEAN": pa.bool_()}
+TYPES = {
+    "MAP(VARCHAR, BIGINT)": pa.map_(pa.string(), pa.int64()),
+    "BIGINT": pa.int64(),
+    "INTEGER": pa.int32(),
+    "DOUBLE": pa.float64(),
+    "BOOLEAN": pa.bool_(),
+}
 CAMERA = (
     "/camera/driver → /camera/image → /perception/detector → /perception/detections"
     " → /perception/tracker → /perception/objects → /planning/planner → /planning/trajectory"
@@ -198,7 +204,7 @@ def test_a_zero_that_is_the_answer_is_shown(width: int) -> None:
             {
                 "topic_name": "/perception/camera/image", "subscriber": "/perception/detector",
                 "published": 299, "delivered": 298, "not_connected": 1, "delivered_percent": 100.0,
-                "lost_percent": 0.0, "reasons": "pending_at_end 1", "subscription_id": 4,
+                "lost_percent": 0.0, "reasons": [("pending_at_end", 1)], "subscription_id": 4,
             },
         ] * 2,
     )  # fmt: skip

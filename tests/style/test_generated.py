@@ -9,7 +9,6 @@ from types import ModuleType
 
 import pytest
 
-from msgflow.db.store_table import store_file
 from msgflow.query.catalogue import query_names
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,10 +34,6 @@ def _pages() -> dict[Path, str]:
 def test_page_is_current(path: Path) -> None:
     text = path.read_text()
     assert text == _script().with_answers(_pages()[path], text), "run: python docs/generate.py"
-
-
-def test_tables_are_those_that_are_defined() -> None:
-    assert store_file().read_text() == _script().store(), "run: python docs/generate.py"
 
 
 def test_tables_of_the_model_are_current() -> None:

@@ -12,6 +12,7 @@ from served import Page, Served, shown
 from thorough import few, thorough
 
 from msgflow.database import open_db
+from msgflow.text.values import format_cell
 
 Read = Callable[[Path], duckdb.DuckDBPyConnection]
 Report = Callable[..., str]
@@ -51,7 +52,7 @@ def test_paths(way: str, demo: Path, serve: Serve, report: Report, page: Page, r
             row["path"],
             *(shown(row[name]) for name in durations),
             *(f"{row[name]:,}" for name in counts),
-            *(row[name] or "" for name in reasons),
+            *(format_cell(row[name] or "") for name in reasons),
         ]
         for row in latency
     ]

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from msgflow.cli.app import app
 from msgflow.database import open_db
 from msgflow.errors import UsageError
+from msgflow.text.json_value import json_value
 from msgflow.view.page_query import Question
 from msgflow.view.pages import SUMMARY, Pages
 from msgflow.view.summary import Section, query_section
@@ -58,7 +59,7 @@ def test_its_numbers_are_those_of_the_command_beside_them(part: str, dropping: P
             for _ in printed(command, dropping)
         )  # fmt: skip
         assert {row.pop("rank") for row in rows} == {1}
-    assert rows == json.loads(json.dumps(own))
+    assert rows == json_value(own)
     assert rows
 
 

@@ -28,7 +28,7 @@ def test_names_are_text_and_all_fits() -> None:
     """A program may call itself what it likes: no markup, no control characters."""
     times = {"median_ns": 1_000_000, "p99_ns": 2_000_000, "max_ns": 2_000_000}
     thread = {"nodes": "[/x] \x1b[31m", "tid": 7, "callback_share": 0.5, "longest_ns": 48_100_000}
-    topic = {"topic": "[/y]" * 40, "dropped": 4, "lost": 0, "reasons": "[r] " * 40}
+    topic = {"topic": "[/y]" * 40, "dropped": 4, "lost": 0, "reasons": {"[r] " * 40: 4}}
     topic |= {"rate_hz": 1e4, "period_deviation_ns": 123_400_000, "latency_p95_ns": 123_400_000}
     report = WindowReport(
         window=Window(0, 2_000_000_000),

@@ -6,6 +6,9 @@
 -- param: callbacks VARCHAR[][]  Node of each, and what triggers it
 -- column: node VARCHAR  Node
 -- column: callback VARCHAR  What triggers the callback
+-- column: function VARCHAR  Function
+-- column: self_share DOUBLE  Its share of the CPU time
+-- column: all_samples BIGINT  Samples of the callback
 WITH sampled AS (
     SELECT l.node, l.label AS callback, s.stack_id, s.cpu_ns
     FROM main.stack_sample AS s

@@ -77,7 +77,7 @@ def test_what_is_worst_comes_first() -> None:
 @pytest.mark.parametrize("length", [10, 300])
 def test_it_fits_80_columns(length: int) -> None:
     screen = new_screen()
-    topic = {"dropped": 12, "lost": 0, "reasons": "r" * 99, "rate_hz": 20.4}
+    topic = {"dropped": 12, "lost": 0, "reasons": {"r" * 99: 12}, "rate_hz": 20.4}
     topic |= {"period_deviation_ns": 3 * MS, "latency_p95_ns": 7 * MS}
     silent = dict.fromkeys(topic) | {"topic": "/silent", "dropped": 0, "lost": 0}
     topics = [silent, topic | {"topic": "/t" * length}]
@@ -159,7 +159,13 @@ def test_it_is_as_high_as_the_terminal_at_most(
     """What is violated, all tables and the keys are seen in each."""
     console = terminal(width, height)
     screen = WatchScreen(console)
-    topic = {"topic": "/t", "dropped": 12, "lost": 0, "reasons": "overwritten 12", "rate_hz": 9.8}
+    topic = {
+        "topic": "/t",
+        "dropped": 12,
+        "lost": 0,
+        "reasons": {"overwritten": 12},
+        "rate_hz": 9.8,
+    }
     topic |= {"period_deviation_ns": None, "latency_p95_ns": 7 * MS}
     executor = {"nodes": "/detector", "tid": 77, "callback_share": 0.5, "callbacks": 100}
     executor |= {"blocked_ns": 0, "longest_ns": 60 * MS, "longest_callback": None}
