@@ -29,7 +29,7 @@ _INSTEAD = {
     ("msgflow query", "--list"): "msgflow query",
     ("msgflow query critical-path", "--take"): "msgflow flow --take ID --why",
     ("msgflow clocks", "pairs"): "msgflow clocks --by pair",
-    ("msgflow fleet", "pack"): "nothing: msgflow fleet remove deletes what no run needs",
+    ("msgflow fleet", "pack"): "msgflow fleet remove deletes what no run needs",
     ("msgflow fleet ingest", "--views"): (
         "msgflow fleet sql 'FROM view.publication', or msgflow fleet open RUN and then msgflow"
         " export parquet"

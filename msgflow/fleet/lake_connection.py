@@ -117,8 +117,18 @@ def what_there_is(name: str, labels: Sequence[str], columns: Sequence[str]) -> s
 class Reading(ExitStack):
     """A connection to chosen runs of a lake. Use it as a context manager, or call `close`."""
 
-    def __init__(self, choice: Choice, tables: Iterable[str], views: Iterable[str] = ()) -> None:
-        """Open some tables of runs for reading, and public views that their databases have."""
+    def __init__(
+        self,
+        choice: Choice,
+        tables: Iterable[str],
+        views: Iterable[str] = (),
+        *,
+        groups: pa.Table | None = None,
+    ) -> None:
+        """Open some tables of runs for reading, and public views that their databases have.
+
+        Where `groups` says a label_group of each run, tables have that as well.
+        """
         super().__init__()
         self.choice = choice
         self._folder = Path(self.enter_context(TemporaryDirectory(prefix="msgflow-")))
@@ -126,6 +136,9 @@ class Reading(ExitStack):
         # It has the table `run`, and a view of each table, without the column `part`.
         self.connection = self.enter_context(open_memory())
         try:
+            if groups is not None:
+                self.connection.register("run_group", groups)
+            self._join = "" if groups is None else "JOIN run_group USING (run)"
             with lake_errors(choice.lake):
                 self._fill(tables, views)
             shut_in(self.connection, files=self._files)
@@ -157,7 +170,7 @@ class Reading(ExitStack):
         self.connection.execute(f"SET VARIABLE {identifier(name)} = $files", {"files": files})
         self.connection.execute(
             f"CREATE VIEW {name} AS SELECT * EXCLUDE (part) "
-            f"FROM read_parquet(getvariable({literal(name)}), union_by_name = true)"
+            f"FROM read_parquet(getvariable({literal(name)}), union_by_name = true) {self._join}"
         )
 
     def _of_databases(self, views: Sequence[str]) -> dict[str, list[str]]:

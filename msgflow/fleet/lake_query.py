@@ -19,6 +19,7 @@ import duckdb
 import pyarrow as pa
 
 from msgflow.database import guarded_rows, sql_error
+from msgflow.db.sandbox import open_memory
 from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_connection import (
@@ -38,7 +39,7 @@ from msgflow.sql.failure import first_line
 from msgflow.sql.header import Column, Header, relations_of
 from msgflow.sql.interrupt import interruptible
 from msgflow.sql.quoting import identifier
-from msgflow.sql.statement import Statements
+from msgflow.sql.statement import Statements, registered
 from msgflow.sql.value import Value
 from msgflow.text.name_suggestions import did_you_mean
 
@@ -113,9 +114,9 @@ def fleet_query(
         del own[variant.name]
     chosen = make_selection(dict(selection or {}), lake_names)
     choice = choose(lake, where)
-    with Reading(choice, _tables(header)) as reading:
+    grouped, groups = _grouped(choice, header, group_by)
+    with Reading(choice, _tables(header), groups=groups) as reading:
         con = reading.connection
-        grouped = _group(con, choice, header, group_by)
         sql, bindings = selected(grouped, chosen, internal)
         table = _asked(lake, name, con, lambda: con.sql(sql, params=own | bindings))
     table, missing, _ = shown_rows(table, internal=internal)
@@ -199,10 +200,8 @@ def _tables(header: Header) -> list[str]:
     return sorted(read.intersection(ANSWERS))
 
 
-def _group(
-    con: duckdb.DuckDBPyConnection, choice: Choice, header: Header, group_by: Sequence[str]
-) -> Header:
-    """Make a table with the group of each run; return the query with the labels of groups."""
+def _grouped(choice: Choice, header: Header, group_by: Sequence[str]) -> tuple[Header, pa.Table]:
+    """Return a query with the labels of groups, and the group of each run: a list of labels."""
     taken = {column.name.lower() for column in header.columns}
     fields = set(choice.runs.column_names) - {"labels"}
     values, bound = [], {}
@@ -220,28 +219,19 @@ def _group(
             )
         title = f"label_{name}" if name.lower() in taken else name
         columns.append(Column(title, "VARCHAR", None, f"Value of {name}"))
+    group = f"SELECT run, [{', '.join(values)}]::VARCHAR[] AS {GROUP} FROM known_run"
+    with open_memory() as con, registered(con, known_run=choice.runs):
+        groups = con.sql(group, params=bound).to_arrow_table()
     listed = "".join(
-        f", {value} AS {identifier(column.name)}"
-        for value, column in zip(values, columns, strict=True)
+        f"{GROUP}[{place}] AS {identifier(column.name)}, "
+        for place, column in enumerate(columns, 1)
     )
-    number = f"dense_rank() OVER (ORDER BY {', '.join(values)})" if values else "1::BIGINT"
-    rows = con.sql(f"SELECT run, {number} AS {GROUP} FROM run", params=bound)
-    con.register("run_group", rows.to_arrow_table())
-    kept = tuple(column for column in header.columns if column.name != GROUP)
     text = STATEMENTS.text(header.name).rstrip().rstrip(";")
-    if not columns:
-        body = f"SELECT * EXCLUDE ({GROUP}) FROM (\n{text}\n)"
-        return replace(header, columns=kept, body=body)
-    labels = con.sql(f"SELECT DISTINCT {number} AS {GROUP}{listed} FROM run", params=bound)
-    con.register("group_label", labels.to_arrow_table())
-    body = (
-        "SELECT l.* EXCLUDE (label_group), q.* EXCLUDE (label_group, place) FROM ("
-        f"SELECT row_number() OVER () AS place, * FROM (\n{text}\n)) AS q "
-        f"JOIN group_label AS l ON q.{GROUP} = l.{GROUP} ORDER BY q.place"
-    )
-    first = tuple(column.name for column in columns)
+    body = f"SELECT {listed}* EXCLUDE ({GROUP}) FROM (\n{text}\n)"
+    kept = (column for column in header.columns if column.name != GROUP)
+    first = (column.name for column in columns)
     brief = (*header.brief[:1], *first, *header.brief[1:])
-    return replace(header, columns=(*columns, *kept), body=body, brief=brief)
+    return replace(header, columns=(*columns, *kept), body=body, brief=brief), groups
 
 
 def _asked(

@@ -48,9 +48,9 @@ def rows(table: pa.Table, columns: list[str]) -> list[tuple[object, ...]]:
 
 
 def test_headers_are_those_of_the_statements(night: Lake) -> None:
-    with Reading(choose(night), ANSWERS) as reading:
+    groups = duckdb.sql("SELECT $key AS run, ['r1'] AS label_group", params={"key": "c" * 20})
+    with Reading(choose(night), ANSWERS, groups=groups.to_arrow_table()) as reading:
         con = reading.connection
-        con.execute("CREATE TABLE run_group AS SELECT run, 1::BIGINT AS label_group FROM run")
         for name in STATEMENTS.names():
             header = STATEMENTS.header(name)
             if not header.columns:

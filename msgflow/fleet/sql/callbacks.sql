@@ -12,7 +12,7 @@
 -- brief: node, callback, median_ns, max_ns, p95_ns, runs, count, period_median_ns, p99_ns, mean_ns
 WITH merged AS (
     SELECT
-        g.label_group, c.node, c.callback,
+        c.label_group, c.node, c.callback,
         count(DISTINCT c.run) AS runs,
         sum(c.count)::BIGINT AS count,
         sum(c.open)::BIGINT AS open,
@@ -28,8 +28,7 @@ WITH merged AS (
         string_agg(DISTINCT c.symbol, ', ' ORDER BY c.symbol) AS symbol,
         bool_and(c.is_internal) AS is_internal
     FROM callbacks AS c
-    JOIN run_group AS g ON c.run = g.run
-    GROUP BY g.label_group, c.node, c.callback
+    GROUP BY c.label_group, c.node, c.callback
 )
 SELECT
     m.label_group, m.node, m.callback, m.runs, m.count, m.open, m.period_min_ns,

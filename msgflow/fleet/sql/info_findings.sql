@@ -2,7 +2,7 @@
 -- description: Findings of the query info --section findings over many runs, with cause and cure.
 --     Each names the run that has most of it.
 -- grain: one row per kind of finding and group of runs
--- column: label_group BIGINT  Group of runs
+-- column: label_group VARCHAR[]  Group of runs
 -- column: severity VARCHAR    'error' where results are wrong or missing, 'warning' where they may
 --     be, or 'info'
 -- column: name VARCHAR        Name of the finding
@@ -17,7 +17,7 @@
 -- column: cure VARCHAR        What to do about it
 -- brief: severity, title, runs, count, worst_run, subject, places, cure
 SELECT
-    g.label_group, f.severity, f.name,
+    f.label_group, f.severity, f.name,
     any_value(f.title) AS title,
     count(DISTINCT f.run) AS runs,
     count(*) AS places,
@@ -28,7 +28,6 @@ SELECT
     any_value(f.cause) AS cause,
     any_value(f.cure) AS cure
 FROM finding AS f
-JOIN run_group AS g ON f.run = g.run
-GROUP BY g.label_group, f.severity, f.name
+GROUP BY f.label_group, f.severity, f.name
 ORDER BY
-    list_position(['error', 'warning', 'info'], f.severity), runs DESC, f.name, g.label_group
+    list_position(['error', 'warning', 'info'], f.severity), runs DESC, f.name, f.label_group

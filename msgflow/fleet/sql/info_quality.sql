@@ -3,7 +3,7 @@
 --     and over all its processes, and over the runs. Each topic has a row.
 -- grain: one row per scope, topic, measure and group of runs
 -- like: queries.info-quality
--- column: label_group BIGINT     Group of runs
+-- column: label_group VARCHAR[]     Group of runs
 -- column: scope
 -- column: topic VARCHAR [topic]  Topic; empty: not of one
 -- column: measure
@@ -12,7 +12,7 @@
 -- brief: scope, topic, measure, runs, affected, total, affected_percent
 -- answer: affected
 SELECT
-    g.label_group, q.scope,
+    q.label_group, q.scope,
     CASE WHEN q.scope = 'topic' THEN q.subject END AS topic,
     q.measure,
     count(DISTINCT q.run) FILTER (WHERE q.affected > 0) AS runs,
@@ -21,6 +21,5 @@ SELECT
     100.0::DOUBLE * sum(q.affected) / nullif(sum(q.total), 0) AS affected_percent,
     bool_and(q.is_internal) AS is_internal
 FROM info_quality AS q
-JOIN run_group AS g ON q.run = g.run
 GROUP BY ALL
-ORDER BY q.scope, topic, q.measure, g.label_group
+ORDER BY q.scope, topic, q.measure, q.label_group

@@ -3,13 +3,11 @@
 -- grain: one row per group of runs, topic, receiving node and column
 -- kind: inline
 WITH listed AS (
-    SELECT g.label_group, d.topic_name, d.subscriber, 'reasons' AS name, d.reasons AS text
+    SELECT d.label_group, d.topic_name, d.subscriber, 'reasons' AS name, d.reasons AS text
     FROM topics_delivery AS d
-    JOIN run_group AS g ON d.run = g.run
     UNION ALL
-    SELECT g.label_group, d.topic_name, d.subscriber, 'orphan_reasons', d.orphan_reasons
+    SELECT d.label_group, d.topic_name, d.subscriber, 'orphan_reasons', d.orphan_reasons
     FROM topics_delivery AS d
-    JOIN run_group AS g ON d.run = g.run
 ),
 part AS (
     SELECT label_group, topic_name, subscriber, name, unnest(string_split(text, ', ')) AS text

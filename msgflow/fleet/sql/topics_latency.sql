@@ -13,7 +13,7 @@
 --     ambiguous, mean_ns, p99_ns, min_ns
 WITH merged AS (
     SELECT
-        g.label_group, t.topic_name, t.subscriber,
+        t.label_group, t.topic_name, t.subscriber,
         count(DISTINCT t.run) AS runs,
         sum(COLUMNS(['takes', 'linked', 'ambiguous', 'negative']))::BIGINT,
         min(t.min_ns) AS min_ns,
@@ -24,8 +24,7 @@ WITH merged AS (
         max(t.max_ns) AS max_ns,
         bool_and(t.is_internal) AS is_internal
     FROM topics_latency AS t
-    JOIN run_group AS g ON t.run = g.run
-    GROUP BY g.label_group, t.topic_name, t.subscriber
+    GROUP BY t.label_group, t.topic_name, t.subscriber
 )
 SELECT
     m.label_group, m.topic_name, m.subscriber, m.runs, m.takes, m.linked, m.ambiguous, m.negative,

@@ -11,7 +11,7 @@
 --     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
 WITH merged AS (
     SELECT
-        g.label_group, w.node, w.callback,
+        w.label_group, w.node, w.callback,
         count(DISTINCT w.run) AS runs,
         sum(COLUMNS(['count', 'delayed_min', 'delayed_max']))::BIGINT,
         CASE WHEN count(*) = 1 THEN any_value(w.wait_median_ns) END AS wait_median_ns,
@@ -23,8 +23,7 @@ WITH merged AS (
         ]))::BIGINT,
         bool_and(w.is_internal) AS is_internal
     FROM waits AS w
-    JOIN run_group AS g ON w.run = g.run
-    GROUP BY g.label_group, w.node, w.callback
+    GROUP BY w.label_group, w.node, w.callback
 )
 SELECT
     m.label_group, m.node, m.callback, m.runs, m.count, m.delayed_min, m.delayed_max,
