@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-import random
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +21,6 @@ from msgflow.fleet.workers import Workers, make_workers
 
 _LOOKING_AT_ONCE = 8
 _SECONDS_BETWEEN_LOOKS = 0.5
-_LONGEST_PAUSE = 60.0
 
 
 @dataclass
@@ -108,7 +106,6 @@ class _Item:
     recording: Recording
     state: State | None = None
     tries: int = 0
-    pause_end: float = 0.0  # when to try it again, as `time.monotonic` says it
 
 
 @dataclass
@@ -130,8 +127,8 @@ class _Ingest:
         # Runs that this call wrote.
         self._written: set[str] = set()
         self._failed = {row["source"]: row for row in self._lake.failures().to_pylist()}
-        # To try again after a pause.
-        self._paused: list[_Item] = []
+        # To try again, when all others were tried.
+        self._again: list[_Item] = []
 
     def run(self, ray: str | None) -> FleetProgress:
         workers: Workers | None = None
@@ -142,34 +139,24 @@ class _Ingest:
                 running: dict[str, _Item] = {}  # by source
                 while True:
                     while workers is None or workers.has_room():
-                        item = self._next(fresh)
+                        item = next(fresh, None)
+                        if item is None and self._again:
+                            item = self._again.pop(0)
                         if item is None:
                             break
                         # Connect to a cluster only when there is work.
                         workers = workers or make_workers(ray)
                         self._submit(workers, item, running)
-                    if not running and not self._paused:
+                    if not running or workers is None:
                         break
-                    if running and workers is not None:
-                        for task, outcome in workers.wait(_SECONDS_BETWEEN_LOOKS):
-                            self._ended(running.pop(task.source), outcome)
-                    else:
-                        first = min(item.pause_end for item in self._paused)
-                        time.sleep(min(_SECONDS_BETWEEN_LOOKS, max(0, first - time.monotonic())))
+                    for task, outcome in workers.wait(_SECONDS_BETWEEN_LOOKS):
+                        self._ended(running.pop(task.source), outcome)
             finally:
                 pool.shutdown(wait=False, cancel_futures=True)
                 if workers is not None:
                     workers.close()
         self._tell()
         return self._progress
-
-    def _next(self, fresh: Iterator[_Item]) -> _Item | None:
-        """Return the next recording: first one whose pause is over."""
-        for item in self._paused:
-            if item.pause_end <= time.monotonic():
-                self._paused.remove(item)
-                return item
-        return next(fresh, None)
 
     def _new(self, recording: Recording, found: State | MsgflowError) -> _Item | None:
         """Return the item of a recording; None if there is nothing to do."""
@@ -327,10 +314,7 @@ class _Ingest:
     def _failed_now(self, item: _Item, outcome: Outcome) -> None:
         """Try again later if that may help; otherwise write the failure."""
         if outcome.reason in PASSING and item.tries < self._options.tries and item.state:
-            pause = min(self._options.pause * 2 ** (item.tries - 1), _LONGEST_PAUSE)
-            # At random moments: many may have failed together for one reason.
-            item.pause_end = time.monotonic() + pause * random.uniform(0.5, 1.5)
-            self._paused.append(item)
+            self._again.append(item)
             self._progress.retried += 1
             return
         source = item.recording.source

@@ -70,7 +70,6 @@ class Options:
     replace: bool = False  # ingest recordings again that the lake has already
     retry_failed: bool = False  # ingest recordings again that failed before
     tries: int = 3  # most tries of a recording, if another one may succeed
-    pause: float = 2.0  # seconds before the second try; twice as many before each further one
     timeout: float = 3600.0  # most seconds of one recording
     memory: int | None = None  # most bytes of one recording
     scratch: str | None = None  # folder of each worker for temporary files, absolute

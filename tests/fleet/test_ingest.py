@@ -312,7 +312,7 @@ def test_what_may_pass_is_tried_again(
     ):
         workers = fake(*outcomes)
         lake = tmp_path / str(tries)
-        done = fleet_ingest([source], lake, options=Options(pause=0.01))
+        done = fleet_ingest([source], lake)
         assert [reason for _, reason, _ in done.failures] == failed
         assert len(workers.tasks) == tries
         (row,) = Lake.open(lake).failures().to_pylist()
