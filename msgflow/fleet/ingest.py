@@ -344,7 +344,7 @@ def _has_changed(run: Mapping[str, Any]) -> bool:
     found = _look(Recording(run["source"]))
     if isinstance(found, MsgflowError):
         return isinstance(found, TraceError)
-    return found.signature != run["source_signature"]
+    return bool(found.signature != run["source_signature"])
 
 
 def _look(recording: Recording) -> State | MsgflowError:

@@ -102,27 +102,17 @@ def read_manifest(source: str) -> list[Recording]:
     """Return the recordings of a manifest, in its order.
 
     Each has a path; a relative one starts in the folder of the manifest. All other columns are
-    labels, taken as text; an empty value means no label. Equal rows count once.
+    labels, taken as text; an empty value means no label.
     """
     url = normal_url(source)
     folder, _, name = url.rpartition("/")
     content = Store(folder or "/").read(name, _MOST_BYTES)
     if content is None:
         raise UsageError(f"no such manifest — {source}", "check the path")
-    rows = list(_rows(content, source))
-    if not rows:
+    found = [_recording(place, values, folder, source) for place, values in _rows(content, source)]
+    if not found:
         raise UsageError(f"the manifest is empty — {source}", "a column path, and a row for each")
-    found: dict[str, tuple[Recording, str]] = {}
-    for place, values in rows:
-        recording = _recording(place, values, folder, source)
-        earlier, first = found.setdefault(recording.source, (recording, place))
-        if earlier != recording:
-            raise UsageError(
-                f"the manifest says two things of one recording, in {first} and {place}"
-                f" — {values[PATH]}",
-                "leave out one of the two",
-            )
-    return [recording for recording, _ in found.values()]
+    return found
 
 
 def _recording(place: str, values: Mapping[str, str], folder: str, source: str) -> Recording:

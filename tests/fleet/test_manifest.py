@@ -36,7 +36,8 @@ def test_labels_are_texts_as_they_stand_there(tmp_path: Path) -> None:
         "\r\n"
         f'{tmp_path}/a,r1,"says ""hi"", twice\nand more",007\r\n'
     )
-    first, second = read_manifest(manifest(tmp_path, text))
+    # Equal rows count once.
+    first, second = find_recordings([manifest(tmp_path, text)])
     assert first.source == str(tmp_path / "a")
     assert first.labels == {
         "robot": "r1",
@@ -57,7 +58,7 @@ def test_labels_are_texts_as_they_stand_there(tmp_path: Path) -> None:
         ("n.csv", "path,my robot\na,b\n", "no key of a label — 'my robot', a column of"),
         ("n.csv", "path,robot\na,b\n,c\n", "a row without a path, in line 3"),
         ("n.csv", "path,robot\na,b,c\n", "3 values for 2 columns, in line 2"),
-        ("n.csv", "path,robot\na,b\n./a,c\n", "two things of one recording, in line 2 and line 3"),
+        ("n.csv", "path,robot\na,b\n./a,c\n", "given twice, with different labels — .*/a"),
         ("n.csv", 'path,robot\na,"b\n', "cannot read the manifest: .*in line 2"),
         ("n.csv", b"path\n\xff\n", "not UTF-8"),
         ("n.csv", f"path,x\na,{'y' * 1001}\n", "no value of a label — x, in line 2"),
@@ -65,7 +66,7 @@ def test_labels_are_texts_as_they_stand_there(tmp_path: Path) -> None:
 )
 def test_what_is_no_manifest(tmp_path: Path, name: str, text: str | bytes, words: str) -> None:
     with pytest.raises(UsageError, match=words):
-        read_manifest(manifest(tmp_path, text, name))
+        find_recordings([manifest(tmp_path, text, name)])
 
 
 def test_sources_are_paths_patterns_and_manifests(
