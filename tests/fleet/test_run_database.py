@@ -67,6 +67,7 @@ def test_what_a_killed_process_left_goes_with_the_next(
     assert list(tmp_path.iterdir()) == [target]
 
 
+@pytest.mark.thorough
 def test_views_of_a_database_of_an_earlier_version_are_those_of_this_one(
     night: Lake, tmp_path: Path
 ) -> None:
