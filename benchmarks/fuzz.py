@@ -251,7 +251,7 @@ def lake_commands(lake: Path, outside: Path) -> dict[str, Any]:
             ("sql", "FROM run"),
             ("worst", "*"),
             ("open", "copy", "-o", str(lake.with_name("opened.duckdb"))),
-            ("pack",),
+            ("remove",),
             ("runs",),
         )
     ]

@@ -29,7 +29,15 @@ _INSTEAD = {
     ("msgflow query", "--list"): "msgflow query",
     ("msgflow query critical-path", "--take"): "msgflow flow --take ID --why",
     ("msgflow clocks", "pairs"): "msgflow clocks --by pair",
-    ("msgflow fleet", "compact"): "msgflow fleet pack",
+    ("msgflow fleet", "pack"): "msgflow fleet remove deletes what no run needs",
+    ("msgflow fleet ingest", "--views"): (
+        "msgflow fleet sql 'FROM view.publication', or msgflow fleet open RUN and then msgflow"
+        " export parquet"
+    ),
+    ("msgflow ui", "--lake"): "msgflow fleet open RUN --lake LAKE, then msgflow ui --db RUN.duckdb",
+    ("msgflow report", "--lake"): (
+        "msgflow fleet query e2e-latency --group-by run --lake LAKE --format markdown"
+    ),
     ("msgflow graph", "svg"): "msgflow graph | dot -Tsvg; or msgflow ui, page Graph",
 }
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)

@@ -44,7 +44,6 @@ def ingest(
     timeout: str = "1h",
     memory: str | None = None,
     scratch: Path | None = None,
-    views: Annotated[bool, typer.Option()] = False,
     database: Annotated[bool, typer.Option()] = True,
     clock_sync: Annotated[str, typer.Option()] = "none",
     reader: Reader = "auto",
@@ -60,7 +59,7 @@ def ingest(
 
     Args:
         sources (SOURCE...): Recordings: directories, archives, patterns ('s3://bucket/night/*'), or
-            manifests (.csv, .jsonl, .parquet) with a column path and labels.
+            manifests (.csv) with a column path and labels.
         label (KEY=VALUE): Say so of all; may be repeated.
         shard (I/N): Do this part of N, 0/N is the first.
         ray (ADDRESS): Ray cluster that does the work: its address, auto, or local; by default
@@ -71,7 +70,6 @@ def ingest(
         timeout (TIME): What one recording may take: 90s, 2h.
         memory (SIZE): What one recording may take, such as 4GB; else no limit.
         scratch (DIR): Folder of each worker; by default that of the system.
-        views: Also write the public views.
         database: Also write the database of each run.
         clock_sync (none|messages): As msgflow ingest has it, for each.
     """
@@ -96,7 +94,6 @@ def ingest(
     }
     options = Options(
         ingest=given,
-        views=views,
         database=database,
         replace=replace,
         retry_failed=retry_failed,
@@ -287,29 +284,20 @@ def open_(run: Annotated[str, typer.Argument()], *, lake: str, output: Path | No
 
 @app.command("remove")
 @operation
-def remove(keys: list[str], *, lake: str) -> None:
-    """Take runs out of a lake; their files go with the next `msgflow fleet pack`.
+def remove(keys: list[str] | None = None, *, lake: str) -> None:
+    """Remove runs from a lake, and all files that no run needs.
+
+    Without a run: files of runs that were replaced and of killed writers, after a day.
 
     Args:
-        keys (RUN...): Keys of runs.
+        keys ([RUN...]): Keys of runs.
     """
-    removed = _opened(lake).remove(keys)
-    print_status(f"{count(removed, 'run')} removed from {lake}")
-
-
-@app.command("pack")
-@operation
-def pack(*, lake: str) -> None:
-    """Put answers and views of many runs into few files, and delete those that no run needs.
-
-    Nothing else may use the lake meanwhile: no ingest, and no query.
-    """
-    from msgflow.fleet.pack import pack as packed
-
-    done = packed(_opened(lake))
+    opened = _opened(lake)
+    runs = list(dict.fromkeys(keys or ()))
+    files, size = opened.clean_up(opened.remove(runs) if runs else ())
     print_status(
-        f"files of {count(done.runs, 'run')} put into {count(done.packs, 'part')};"
-        f" {count(done.deleted, 'file')} deleted, {done.size / 1e6:,.1f} MB"
+        f"{count(len(runs), 'run')} and {count(files, 'file')} of {size / 1e6:,.1f} MB removed"
+        f" from {lake}"
     )
 
 

@@ -188,11 +188,3 @@ SHARED: dict[str, Any] = {
     ),
 }
 """What Typer should know of a parameter; the function says its type and its default."""
-
-# Not from MSGFLOW_LAKE: without this option these commands read a database.
-LAKE_PAGE: Any = typer.Option(
-    metavar="PATH",
-    parser=os.path.expanduser,
-    help="A lake (a folder, or s3://BUCKET/PREFIX), in place of a database: paths by label over"
-    " time",
-)

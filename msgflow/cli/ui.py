@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import Future, wait
-from contextlib import AbstractContextManager, ExitStack
+from concurrent.futures import wait
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from msgflow.cli.operation import operation
-from msgflow.cli.options import LAKE_PAGE
 from msgflow.cli.output import print_note, print_status
-from msgflow.errors import MsgflowError, UsageError
+from msgflow.errors import MsgflowError
 from msgflow.files.default_files import DEFAULT_DATABASE
 
 # Without a limit, Windows would not notice Ctrl-C.
@@ -26,13 +24,9 @@ def command(
     browser: bool = True,
     port: Annotated[int | None, typer.Option(min=0, max=65535)] = None,
     memory_limit: str | None = None,
-    lake: Annotated[str | None, LAKE_PAGE] = None,
-    where: str | None = None,
     database: Path = DEFAULT_DATABASE,
 ) -> None:
     """Show the database in the browser: timeline, paths, graph, executors, comparison.
-
-    With --lake: paths of all runs of a lake by label over time, outliers, failures.
 
     The printed address contains a token; without it, nothing is shown. The server answers this
     machine only: from another one, open the same address through ssh -L. Ctrl-C stops it. While it
@@ -50,13 +44,9 @@ def command(
     from msgflow.view.sql_page import MOST_SECONDS
 
     with ExitStack() as stack:
-        if lake is not None:
-            server = _serving_lake(lake, where, port)
-        else:
-            require_no_where(where)
-            sql = WarmSql(database, memory_limit=memory_limit, seconds=MOST_SECONDS)
-            stack.callback(sql.close)
-            server = serving(database, sql, port=port, memory_limit=memory_limit)
+        sql = WarmSql(database, memory_limit=memory_limit, seconds=MOST_SECONDS)
+        stack.callback(sql.close)
+        server = serving(database, sql, port=port, memory_limit=memory_limit)
         address, served = stack.enter_context(server)
         print_status(address)
         print_status("Ctrl-C ends it")
@@ -65,30 +55,6 @@ def command(
         while not wait([served], _SECONDS_BETWEEN_LOOKS).done:
             pass
         raise MsgflowError("the server of the pages has ended") from served.exception()
-
-
-def _serving_lake(
-    lake: str, where: str | None, port: int | None
-) -> AbstractContextManager[tuple[str, Future[None]]]:
-    from msgflow.fleet.lake import Lake
-    from msgflow.fleet.lake_page import lake_page
-    from msgflow.view.server import serving_application, single_application
-
-    opened = Lake.open(lake)
-    # Made once before the browser asks, so that errors are printed here.
-    first = [lake_page(opened, where=where).content]
-
-    def page() -> str:
-        return first.pop() if first else lake_page(opened, where=where).content
-
-    place = lake if "://" in lake else os.path.realpath(lake)
-    return serving_application(place, port, lambda token: single_application(page, token))
-
-
-def require_no_where(where: str | None) -> None:
-    """Raise an error if --where is given without --lake."""
-    if where is not None:
-        raise UsageError("--where chooses runs of a lake", "--lake PATH")
 
 
 def _open(address: str) -> bool:

@@ -26,12 +26,9 @@ from msgflow.fleet.file_store import S3
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.part import write_part
 from msgflow.fleet.sources import fetch, look_at
-from msgflow.fleet.task import RESULT, STAGE, Outcome, Reason, Task, without_secrets
+from msgflow.fleet.task import RESULT, STAGE, Outcome, Reason, Task, is_disk_full, without_secrets
 
 _ORPHAN = 1
-# What says that a disk is full.
-_FULL = (errno.ENOSPC, errno.EDQUOT)
-_FULL_WORDS = re.compile("no space left|not enough free|disk quota", re.IGNORECASE)
 
 
 def main() -> None:
@@ -95,12 +92,7 @@ def _values(task: Task, directory: Path, enter: Callable[[str], None]) -> dict[s
     limit = f"{task.memory}B" if task.memory else None
     with Database(database, memory_limit=limit) as opened:
         part = write_part(
-            opened.connection,
-            database,
-            lake.store,
-            directory,
-            views=task.views,
-            database=task.database,
+            opened.connection, database, lake.store, directory, database=task.database
         )
     return {
         **part,
@@ -139,7 +131,7 @@ def failed_outcome(error: Exception, stage: str) -> Outcome:
     reason = Reason.ERROR
     if isinstance(error, ChangedError):
         reason = Reason.CHANGED
-    elif getattr(error, "errno", None) in _FULL or _FULL_WORDS.search(message):
+    elif is_disk_full(error):
         reason = Reason.NO_SPACE
     elif isinstance(error, MemoryError) or re.search("(?i:out of memory)|more memory", message):
         reason = Reason.TOO_LARGE

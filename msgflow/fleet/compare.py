@@ -4,23 +4,37 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import pyarrow as pa
-
+from msgflow.db.sandbox import open_memory
 from msgflow.errors import UsageError
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_connection import Reading, choose
 from msgflow.query.compare import runs_compared, share_of
 from msgflow.query.differences import STATISTICS, Differences
 from msgflow.query.selection import CASES, CUT_COLUMN
+from msgflow.sql.statement import registered
 from msgflow.text.name_suggestions import meant_or, nearest
+from msgflow.text.values import count
 
 Row = dict[str, Any]
 
+_VALUES = """
+SELECT labels[$by] AS value, count(*)
+FROM chosen
+WHERE value IS NOT NULL
+GROUP BY value
+"""
+_SIDED = """
+SELECT
+    run,
+    CASE labels[$by] WHEN $base THEN 'a' WHEN $other THEN 'b' END AS side,
+    coalesce(labels[$unit], run) AS unit
+FROM chosen
+WHERE side IS NOT NULL
+"""
 _TABLES = ("flow", "e2e_latency")
 _SHOWN = ("B is longer", "B is shorter")
 _MOST_NAMED = 10
@@ -61,27 +75,21 @@ def compare(
                 f"no run of the lake has such a label — {key}",
                 meant_or(nearest(key, choice.labels), have, "?"),
             )
-    labels = [dict(pairs or ()) for pairs in choice.runs["labels"].to_pylist()]
-    known = Counter(each[by] for each in labels if by in each)
-    base, other = _sides(by, known, base, other)
-    sides = {base: "a", other: "b"}
-    keys = choice.runs["run"].to_pylist()
-    sided = [
-        (key, sides[each[by]], each.get(unit, key) if unit else key)
-        for key, each in zip(keys, labels, strict=True)
-        if each.get(by) in sides
-    ]
-    runs, sides_of_runs, units = map(list, zip(*sided, strict=True))
-    table = pa.table({"run": runs, "side": sides_of_runs, "unit": units})
-    wanted = pa.array([each.get(by) in sides for each in labels])
-    with Reading(replace(choice, runs=choice.runs.filter(wanted)), _TABLES) as reading:
-        reading.connection.register("sided", table)
+    with open_memory() as con, registered(con, chosen=choice.runs):
+        known = dict(con.execute(_VALUES, {"by": by}).fetchall())
+        base, other = _sides(by, known, base, other)
+        values = {"by": by, "unit": unit, "base": base, "other": other}
+        sided = con.sql(_SIDED, params=values).to_arrow_table()
+        with registered(con, sided=sided):
+            runs = con.sql("FROM chosen SEMI JOIN sided USING (run)").to_arrow_table()
+    with Reading(replace(choice, runs=runs), _TABLES) as reading:
+        reading.connection.register("sided", sided)
         result = runs_compared(
             reading.connection, case=case, confidence=confidence, at_least=share_of(at_least)
         )
     rows = result.to_arrow().to_pylist()
-    result.notes.extend(_who(by, base, other, sided, unit))
-    result.notes.extend(_left_out(by, known, sides, len(labels)))
+    result.notes.extend(_who(by, base, other, sided.to_pylist(), unit))
+    result.notes.extend(_left_out(by, known, len(sided), len(choice.runs)))
     paths = [row for row in rows if row["statistic"] == STATISTICS[0]]
     result.notes.extend(_one_sided(paths, by))
     result.notes.extend(_doubts(rows, paths, confidence))
@@ -121,15 +129,13 @@ def _natural(text: str) -> list[tuple[int, int | str]]:
     ]
 
 
-def _who(
-    by: str, base: str, other: str, sided: list[tuple[str, str, str]], unit: str | None
-) -> Iterator[str]:
+def _who(by: str, base: str, other: str, sided: Sequence[Row], unit: str | None) -> Iterator[str]:
     units: dict[str, set[str]] = {}
-    for name, side, value in (("A", "a", base), ("B", "b", other)):
-        runs = [row for row in sided if row[1] == side]
-        units[side] = {row[2] for row in runs}
+    for side, value in (("a", base), ("b", other)):
+        runs = [row["unit"] for row in sided if row["side"] == side]
+        units[side] = set(runs)
         of = f", {len(units[side]):,} by {unit}" if unit is not None else ""
-        yield f"{name} is {by}={value}: {len(runs):,} run{'s' * (len(runs) != 1)}{of}"
+        yield f"{side.upper()} is {by}={value}: {count(len(runs), 'run')}{of}"
     both = units["a"] & units["b"]
     if unit is not None and both:
         yield (
@@ -138,11 +144,9 @@ def _who(
         )
 
 
-def _left_out(
-    by: str, known: Mapping[str, int], sides: Mapping[str, str], total: int
-) -> Iterator[str]:
-    others = sum(number for value, number in known.items() if value not in sides)
-    without = total - sum(known.values())
+def _left_out(by: str, known: Mapping[str, int], sided: int, total: int) -> Iterator[str]:
+    labelled = sum(known.values())
+    others, without = labelled - sided, total - labelled
     if others or without:
         yield f"left out: {others:,} runs with other values of {by}, {without:,} without it"
 
@@ -157,7 +161,7 @@ def _one_sided(paths: Sequence[Row], by: str) -> Iterator[str]:
     for side in ("A", "B"):
         number = sum(row["verdict"] == f"only in {side}" for row in paths)
         if number:
-            yield f"{number} path{'s' * (number != 1)} with values only in {side}"
+            yield f"{count(number, 'path')} with values only in {side}"
 
 
 def _doubts(rows: Sequence[Row], paths: Sequence[Row], confidence: float) -> Iterator[str]:

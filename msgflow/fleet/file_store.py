@@ -6,20 +6,18 @@ are never written, and never part of an address.
 
 from __future__ import annotations
 
-import errno
 import io
 import os
 import posixpath
-import random
 import re
 import shutil
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, BinaryIO, TypeVar
+from typing import Any, BinaryIO
 from urllib.parse import urlsplit
 
 from pyarrow import fs
@@ -28,28 +26,17 @@ from msgflow.errors import DatabaseError, UsageError, require_utf8
 from msgflow.files.temporary_owner import mark
 from msgflow.trace.regular_file import open_regular
 
-_T = TypeVar("_T")
-
 S3 = "s3://"
 MOST_ATTEMPTS = 6
-"""Tries of each request by the client of AWS, whose pauses double: some 10 s together."""
-PAUSES = (0.1, 0.3, 1.0, 3.0)
-"""Seconds between tries of our own, when the client of AWS has given up."""
+"""Tries of each request, with pauses that double: some 10 s together."""
+READ_AT_ONCE = 16
+"""Files that are read from a bucket at the same time."""
 
 _CHUNK = 8 * 1024 * 1024
 _CONNECT_SECONDS = 10
 _REQUEST_SECONDS = 60
 # Variables of the environment that name an endpoint, the more specific one first.
 _ENDPOINTS = ("AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL")
-# Messages of the client of AWS after which another try is useless: no answer after all its tries,
-# access denied, or not found.
-_HOPELESS = re.compile(
-    r"NETWORK_CONNECTION|ACCESS_DENIED|NO_SUCH|NOT_FOUND|INVALID|SIGNATURE|HTTP status 40[0134]"
-)
-# Nor helps another try where there is no such file, or where this machine cannot write its copy.
-_HOPELESS_ERRORS = (
-    errno.ENOENT, errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES,
-)  # fmt: skip
 # A name of a user or a password before the host; a password may have any character.
 _USERINFO = re.compile(r"(//)(?:[^/]*:.*|[^/@]*)@")
 # The same where `//` was forgotten: names of folders may have a colon as well.
@@ -110,23 +97,6 @@ class Store:
         real = os.path.join(self._real_root, os.path.normpath(path)) if path else self._real_root
         return os.path.realpath(real) != real
 
-    def require_files(self, path: str, suffix: str) -> None:
-        """Raise if a folder is a link, or what has this suffix in it is no file.
-
-        It would seem absent.
-        """
-        self._require_here(path)
-        if not self.is_local or not os.path.isdir(self.full(path)):
-            return
-        with _reaching(self.url), os.scandir(self.full(path)) as found:
-            for entry in found:
-                if entry.name.endswith(suffix) and not entry.is_file(follow_symlinks=False):
-                    self._require_here(f"{path}/{entry.name}")
-                    raise DatabaseError(
-                        f"this is no file — {self.url_of(f'{path}/{entry.name}')}",
-                        "move it away: msgflow did not put it there",
-                    )
-
     def _reading(self, path: str) -> Any:
         if self.is_local:
             return open_regular(Path(self.full(path)))
@@ -136,52 +106,46 @@ class Store:
     def _writing(self, path: str) -> Any:
         return self.filesystem.open_output_stream(self.full(path), compression=None)
 
-    def entries(self, path: str = "", *, recursive: bool = True) -> list[Entry]:
+    def entries(self, path: str = "") -> list[Entry]:
         """Return the files below a path, sorted; an empty list if there is no such path."""
         above = len(self._root.rstrip("/")) + 1
         found = [
             Entry(info.path[above:], info.size, info.mtime_ns or 0)
-            for info in self._found(path, fs.FileType.File, recursive=recursive)
+            for info in self._found(path, recursive=True)
+            if info.type == fs.FileType.File
         ]
-        folders = {entry.path.rpartition("/")[0] for entry in found}
-        elsewhere = {folder for folder in folders if self._is_elsewhere(folder)}
-        elsewhere |= {entry.path for entry in found if self._is_link(entry.path)}
-        here = (e for e in found if elsewhere.isdisjoint((e.path, e.path.rpartition("/")[0])))
+        # What a link leads to is of another place.
+        here = (entry for entry in found if not self._is_elsewhere(entry.path))
         return sorted(here, key=lambda entry: entry.path)
 
-    def _is_link(self, path: str) -> bool:
-        return self.is_local and not self._follows_links and os.path.islink(self.full(path))
+    def names(self, path: str = "") -> list[str]:
+        """Return the names of what is directly below a path, whatever it is, sorted."""
+        return sorted(info.base_name for info in self._found(path, recursive=False))
 
-    def folders(self, path: str = "") -> list[str]:
-        """Return the names of the folders directly below a path, sorted."""
-        return sorted(info.base_name for info in self._found(path, fs.FileType.Directory))
-
-    def _found(self, path: str, kind: Any, *, recursive: bool = False) -> list[Any]:
-        """Return what pyarrow says of the files or folders below a path."""
+    def _found(self, path: str, *, recursive: bool) -> list[Any]:
+        """Return what pyarrow says of all below a path."""
         selector = fs.FileSelector(self.full(path), allow_not_found=True, recursive=recursive)
-        found = self._patiently(lambda: self.filesystem.get_file_info(selector))
-        return [info for info in found if info.type == kind]
+        with _reaching(self.url):
+            return list(self.filesystem.get_file_info(selector))
 
     def entry(self, path: str = "") -> Entry | None:
         """Return the entry of one file, None if there is no such file."""
         self._require_here(path)
-        info = self._patiently(lambda: self.filesystem.get_file_info(self.full(path)))
+        with _reaching(self.url):
+            info = self.filesystem.get_file_info(self.full(path))
         is_file = info.type == fs.FileType.File
         return Entry(path, info.size, info.mtime_ns or 0) if is_file else None
 
     def read(self, path: str, most: int | None = None) -> bytes | None:
         """Return the content of a small file, None if there is no such file."""
         self._require_here(path)
-
-        def read() -> bytes | None:
+        with _reaching(self.url):
             try:
                 with self._reading(path) as stream:
-                    return bytes(stream.read() if most is None else stream.read(most + 1))
+                    content = bytes(stream.read() if most is None else stream.read(most + 1))
             except FileNotFoundError:
                 return None
-
-        content = self._patiently(read)
-        if content is not None and most is not None and len(content) > most:
+        if most is not None and len(content) > most:
             raise DatabaseError(
                 f"no file for this: it has more than {most:,} bytes — {self.url_of(path)}",
                 "give the file that you meant",
@@ -191,28 +155,28 @@ class Store:
     def fetch(self, path: str, target: Path) -> None:
         """Copy a file into a new local file."""
         self._require_here(path)
+        with (
+            _reaching(self.url),
+            self._reading(path) as stream,
+            target.open("wb") as file,
+        ):
+            shutil.copyfileobj(stream, file, _CHUNK)
 
-        def copy() -> None:
-            with self._reading(path) as stream, target.open("wb") as file:
-                shutil.copyfileobj(stream, file, _CHUNK)
+    def local_files(self, paths: Sequence[str], folder: Path) -> list[str]:
+        """Return where files can be read here: those of a bucket are copied into this folder."""
 
-        self._patiently(copy)
+        def local(path: str) -> str:
+            if self.is_local:
+                self._require_here(path)
+                return self.full(path)
+            target = folder / path
+            target.parent.mkdir(parents=True, exist_ok=True)
+            self.fetch(path, target)
+            return str(target)
 
-    def _patiently(self, work: Callable[[], _T]) -> _T:
-        """Return what `work` reads; try again if a bucket refuses.
-
-        The client of AWS tries again by itself, but not during a download, and not always when it
-        lists files.
-        """
-        with _reaching(self.url):
-            for pause in () if self.is_local else PAUSES:
-                try:
-                    return work()
-                except OSError as error:
-                    if error.errno in _HOPELESS_ERRORS or _HOPELESS.search(str(error)):
-                        raise
-                    time.sleep(pause * random.uniform(0.5, 1.5))
-            return work()
+        # Only a bucket makes one wait.
+        with ThreadPoolExecutor(1 if self.is_local else READ_AT_ONCE) as pool:
+            return list(pool.map(local, paths))
 
     def put(self, path: str, content: bytes | Path) -> None:
         """Write a file, in place of an existing one."""

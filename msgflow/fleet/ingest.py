@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-import random
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +21,6 @@ from msgflow.fleet.workers import Workers, make_workers
 
 _LOOKING_AT_ONCE = 8
 _SECONDS_BETWEEN_LOOKS = 0.5
-_LONGEST_PAUSE = 60.0
 
 
 @dataclass
@@ -87,12 +85,9 @@ def fleet_ingest(
     if not recordings:
         raise UsageError(f"the lake itself is no recording — {url}", "give other sources")
     opened = Lake.open(lake, create=True)
-    mine, of_all = recordings, {}
     if shard is not None:
-        mine = [each for each in recordings if is_in_shard(each.source, *shard)]
-        of_all = {each.source: each for each in recordings}
-    with opened.writing():
-        return _Ingest(opened, mine, of_all, options or Options(), progress).run(ray)
+        recordings = [each for each in recordings if is_in_shard(each.source, *shard)]
+    return _Ingest(opened, recordings, options or Options(), progress).run(ray)
 
 
 def is_in_shard(source: str, shard: int, shards: int) -> bool:
@@ -111,7 +106,6 @@ class _Item:
     recording: Recording
     state: State | None = None
     tries: int = 0
-    pause_end: float = 0.0  # when to try it again, as `time.monotonic` says it
 
 
 @dataclass
@@ -120,8 +114,6 @@ class _Ingest:
 
     _lake: Lake
     _recordings: Sequence[Recording]
-    # Those of all shards in their order, by source; empty if this process does all.
-    _all: Mapping[str, Recording]
     _options: Options
     _report: Callable[[FleetProgress], None] | None
 
@@ -129,17 +121,14 @@ class _Ingest:
         self._begin = time.monotonic()
         self._progress = FleetProgress(len(self._recordings))
         self._runs = {row["run"]: row for row in self._lake.runs().to_pylist()}
-        own = set(self._lake.names())
-        self._packed = {key: row for key, row in self._runs.items() if key not in own}
         # Of two runs of a source, which a killed writer left, the earlier one is to go.
         latest_first = sorted(self._runs.values(), key=lambda row: -row["committed_ns"])
         self._sources = {row["source"]: row["run"] for row in latest_first}
-        # Runs that this call wrote, and other sources with the packets of a run.
+        # Runs that this call wrote.
         self._written: set[str] = set()
-        self._alike: dict[str, Mapping[str, Any]] = {}
         self._failed = {row["source"]: row for row in self._lake.failures().to_pylist()}
-        # To try again after a pause.
-        self._paused: list[_Item] = []
+        # To try again, when all others were tried.
+        self._again: list[_Item] = []
 
     def run(self, ray: str | None) -> FleetProgress:
         workers: Workers | None = None
@@ -150,34 +139,24 @@ class _Ingest:
                 running: dict[str, _Item] = {}  # by source
                 while True:
                     while workers is None or workers.has_room():
-                        item = self._next(fresh)
+                        item = next(fresh, None)
+                        if item is None and self._again:
+                            item = self._again.pop(0)
                         if item is None:
                             break
                         # Connect to a cluster only when there is work.
                         workers = workers or make_workers(ray)
                         self._submit(workers, item, running)
-                    if not running and not self._paused:
+                    if not running or workers is None:
                         break
-                    if running and workers is not None:
-                        for task, outcome in workers.wait(_SECONDS_BETWEEN_LOOKS):
-                            self._ended(running.pop(task.source), outcome)
-                    else:
-                        first = min(item.pause_end for item in self._paused)
-                        time.sleep(min(_SECONDS_BETWEEN_LOOKS, max(0, first - time.monotonic())))
+                    for task, outcome in workers.wait(_SECONDS_BETWEEN_LOOKS):
+                        self._ended(running.pop(task.source), outcome)
             finally:
                 pool.shutdown(wait=False, cancel_futures=True)
                 if workers is not None:
                     workers.close()
         self._tell()
         return self._progress
-
-    def _next(self, fresh: Iterator[_Item]) -> _Item | None:
-        """Return the next recording: first one whose pause is over."""
-        for item in self._paused:
-            if item.pause_end <= time.monotonic():
-                self._paused.remove(item)
-                return item
-        return next(fresh, None)
 
     def _new(self, recording: Recording, found: State | MsgflowError) -> _Item | None:
         """Return the item of a recording; None if there is nothing to do."""
@@ -192,10 +171,9 @@ class _Ingest:
         run = self._runs.get(self._sources.get(recording.source, ""))
         labels = dict(recording.labels)
         if run is not None and labels and dict(run["labels"] or ()) != labels:
-            with self._lake.changing():
-                run = self._as_it_is_now(run["run"])
-                if run is not None and self._is_there(run, recording, found):
-                    self._commit({**run, "labels": labels})
+            run = self._as_it_is_now(run["run"])
+            if run is not None and self._is_there(run, recording, found):
+                self._commit({**run, "labels": labels})
         if run is not None and self._is_there(run, recording, found):
             self._forget(item)
             self._progress.there += 1
@@ -219,13 +197,12 @@ class _Ingest:
             and run["source"] == recording.source
             and run["source_signature"] == state.signature
             and run["options"] == json.dumps(dict(options.ingest), sort_keys=True)
-            and (run["view_part"] is not None or not options.views)
             and (run["database_part"] is not None or not options.database)
         )
 
     def _as_it_is_now(self, key: str) -> Mapping[str, Any] | None:
         """Read a run again, as another process may have written, replaced or removed it."""
-        row = self._lake.run(key) or self._packed.get(key)
+        row = self._lake.run(key)
         self._know(key, row)
         return row
 
@@ -261,98 +238,61 @@ class _Ingest:
         # The earlier run of the source, if that had other packets.
         before = self._runs.get(self._sources.get(item.recording.source, key))
         before = None if before is None or before["run"] == key else before
+        there = self._as_it_is_now(key)
         self._forget(item)
-        with self._lake.changing():
-            there = self._as_it_is_now(key)
-            # The run is that of another recording, which has the same packets.
-            other = there if there and there["source"] != item.recording.source else None
-            stays = other is not None and not self._takes(item, other)
-            if not stays:
-                # A recording without labels keeps those that it had.
-                had = {} if other and self._all else there or before or {}
-                labels = dict(item.recording.labels) or dict(had.get("labels") or ())
-                row = {
-                    **outcome.values,
-                    "labels": labels,
-                    "committed_ns": there and there["committed_ns"],
-                    "seconds": outcome.seconds,
-                    "tries": item.tries,
-                    "worker": outcome.worker,
-                }
-                if other is not None:
-                    self._displace(other, row)
-                self._commit(row)
-        if other is not None and stays:
-            self._same_packets(item, other, before, outcome)
-            return
-        self._leave(item, before)
-        self._written.add(key)
-        if there is not None or before is not None:
-            self._progress.replaced += 1
+        if there is not None and self._stays(there, item.recording.source):
+            self._same_packets(item, there, outcome)
         else:
-            self._progress.added += 1
-        self._progress.events += row["event_count"] or 0
+            # A recording without labels keeps those that it had.
+            had = (there or before or {}).get("labels")
+            row = {
+                **outcome.values,
+                "labels": dict(item.recording.labels) or dict(had or ()),
+                "seconds": outcome.seconds,
+                "tries": item.tries,
+                "worker": outcome.worker,
+            }
+            self._commit(row)
+            self._written.add(key)
+            if there is not None or before is not None:
+                self._progress.replaced += 1
+            else:
+                self._progress.added += 1
+            self._progress.events += row["event_count"] or 0
+        if before is not None:
+            self._leave(before)
         self._tell()
 
-    def _takes(self, item: _Item, there: Mapping[str, Any]) -> bool:
-        """Tell whether a recording takes the run of another one with the same packets."""
-        if there["source"] not in self._all:
-            return self._options.replace and there["run"] not in self._written
-        # The first one in the order of the command that has them, whichever shard was faster.
-        order = [*self._all].index
-        return order(item.recording.source) < order(there["source"]) or _has_changed(there)
+    def _stays(self, there: Mapping[str, Any], source: str) -> bool:
+        """Tell whether a run stays that of another source, which has the same packets."""
+        if there["source"] == source:
+            return False
+        is_meant = self._options.replace and there["run"] not in self._written
+        return not is_meant and not _has_changed(there)
 
-    def _displace(self, there: Mapping[str, Any], row: Mapping[str, Any]) -> None:
-        """Write what a recording of another shard would say of the one that takes its run."""
-        other = self._all.get(there["source"])
-        if other is None or not other.labels or dict(other.labels) == row["labels"]:
-            return
-        if not _has_changed(there):
-            kept = ("source", "source_signature", "tries", "worker")
-            known = {name: there[name] for name in kept} | {"labels": dict(other.labels)}
-            self._lake.write_failure(known | self._of_same_packets(row))
+    def _leave(self, before: Mapping[str, Any]) -> None:
+        """Remove the earlier run of a source with new packets, unless it is of another one now."""
+        now = self._as_it_is_now(before["run"])
+        if now is not None and now["source"] == before["source"]:
+            self._lake.remove([before["run"]])
+            self._know(before["run"], None)
 
-    def _of_same_packets(self, there: Mapping[str, Any]) -> dict[str, Any]:
-        hint = "leave out one of the two"
-        return {
-            "reason": str(Reason.SAME_PACKETS),
-            "stage": "committing",
-            "error": f"its packets are in the lake already, with other labels, from"
-            f" {there['source']} (run {there['run']})",
-            "hint": hint if self._options.replace else f"{hint}, or give --replace",
-        }
-
-    def _leave(self, item: _Item, before: Mapping[str, Any] | None) -> None:
-        """Remove the earlier run of a source with new packets.
-
-        If another recording of this call has the packets of that run, the run becomes that one's.
-        """
-        if before is None:
-            return
-        if (other := self._alike.get(before["run"])) is not None:
-            own = {name: other[name] for name in ("source", "source_signature", "name")}
-            self._commit({**before, **own})
-            return
-        self._know(before["run"], None)
-        self._packed.pop(before["run"], None)
-        self._lake.remove([before["run"]], of=item.recording.source)
-
-    def _same_packets(
-        self,
-        item: _Item,
-        there: Mapping[str, Any],
-        before: Mapping[str, Any] | None,
-        outcome: Outcome,
-    ) -> None:
+    def _same_packets(self, item: _Item, there: Mapping[str, Any], outcome: Outcome) -> None:
         labels = dict(item.recording.labels)
         if not labels or labels == dict(there["labels"] or ()):
-            self._alike[there["run"]] = outcome.values or {}
-            self._leave(item, before)
             self._progress.same += 1
-            self._tell()
             return
-        said = self._of_same_packets(there)
-        self._failed_now(item, Outcome(**said, signature=outcome.signature, worker=outcome.worker))
+        hint = "leave out one of the two"
+        failed = Outcome(
+            reason=Reason.SAME_PACKETS,
+            stage="committing",
+            error=f"its packets are in the lake already, with other labels, from"
+            f" {there['source']} (run {there['run']})",
+            hint=hint if self._options.replace else f"{hint}, or give --replace",
+            signature=outcome.signature,
+            worker=outcome.worker,
+        )
+        self._failed_now(item, failed)
 
     def _commit(self, row: Mapping[str, Any]) -> None:
         self._lake.commit([row])
@@ -374,10 +314,7 @@ class _Ingest:
     def _failed_now(self, item: _Item, outcome: Outcome) -> None:
         """Try again later if that may help; otherwise write the failure."""
         if outcome.reason in PASSING and item.tries < self._options.tries and item.state:
-            pause = min(self._options.pause * 2 ** (item.tries - 1), _LONGEST_PAUSE)
-            # At random moments: many may have failed together for one reason.
-            item.pause_end = time.monotonic() + pause * random.uniform(0.5, 1.5)
-            self._paused.append(item)
+            self._again.append(item)
             self._progress.retried += 1
             return
         source = item.recording.source
@@ -403,9 +340,11 @@ class _Ingest:
 
 
 def _has_changed(run: Mapping[str, Any]) -> bool:
-    """Tell whether the source of a run is another recording now."""
+    """Tell whether the source of a run is another recording now, or gone."""
     found = _look(Recording(run["source"]))
-    return not isinstance(found, MsgflowError) and found.signature != run["source_signature"]
+    if isinstance(found, MsgflowError):
+        return isinstance(found, TraceError)
+    return bool(found.signature != run["source_signature"])
 
 
 def _look(recording: Recording) -> State | MsgflowError:

@@ -2,41 +2,45 @@
 
 A DuckDB connection has a table `run` with the chosen runs, and a view per table of the lake with
 their rows; public views are in the schema `view`. It can read the files of the chosen runs and
-nothing else. DuckDB reads a folder itself. It reads a bucket through pyarrow, which alone has the
-credentials.
+nothing else. DuckDB reads files of this machine: those of a bucket are copied first.
 """
 
 from __future__ import annotations
 
 import re
 import shlex
-import tempfile
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
 
 import duckdb
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from msgflow.db.sandbox import open_memory, shut_in
 from msgflow.db.sql_guard import require_condition
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.layout import RUN, VIEWS, part_path, view_path
-from msgflow.fleet.part import ANSWERS, KEY, PART, public_views, view_rows, write_rows
+from msgflow.fleet.layout import RUN, part_path
+from msgflow.fleet.part import KEY, PART, ROWS_AT_ONCE, write_rows
 from msgflow.fleet.run_database import run_database
 from msgflow.sql.failure import first_line
 from msgflow.sql.quoting import identifier, literal
+from msgflow.sql.statement import registered
 from msgflow.text.name_suggestions import meant_or, nearest
-from msgflow.version import __version__
 
+VIEWS = "view"
+"""Schema of the public views."""
+
+_VIEWS_AMONG = """
+SELECT view_name
+FROM duckdb_views()
+WHERE database_name = current_database() AND schema_name = 'main' AND NOT internal
+    AND list_contains($names, view_name)
+"""
 _COLUMN = re.compile(r'Referenced column "((?:[^"]|"")*)"')
-# DuckDB says this when pyarrow failed to read a bucket.
-_STREAM = "reading the stream registered as"
 _EXAMPLE = "such as --where \"robot LIKE 'r%' AND software_version = '2.4'\""
 _NONE_YET = "msgflow fleet ingest SOURCE --lake adds some"
 
@@ -114,137 +118,75 @@ class Reading(ExitStack):
     """A connection to chosen runs of a lake. Use it as a context manager, or call `close`."""
 
     def __init__(
-        self, choice: Choice, tables: Sequence[str] | None = None, *, listed: bool = False
+        self,
+        choice: Choice,
+        tables: Iterable[str],
+        views: Iterable[str] = (),
+        *,
+        groups: pa.Table | None = None,
     ) -> None:
-        """Open runs for reading.
+        """Open some tables of runs for reading, and public views that their databases have.
 
-        `tables` are those to read, and public views as `view/NAME`; all when None. `listed` says
-        that names and columns of all others are wanted, too.
+        Where `groups` says a label_group of each run, tables have that as well.
         """
         super().__init__()
         self.choice = choice
-        self.tables: set[str] = set()  # those asked for that these runs have
-        self._local_files: list[str] = []
-        # It has the table `run`, and a view of each table that was asked for, without the column
-        # `part`.
+        self._folder = Path(self.enter_context(TemporaryDirectory(prefix="msgflow-")))
+        self._files: list[str] = []
+        # It has the table `run`, and a view of each table, without the column `part`.
         self.connection = self.enter_context(open_memory())
         try:
+            if groups is not None:
+                self.connection.register("run_group", groups)
+            self._join = "" if groups is None else "JOIN run_group USING (run)"
             with lake_errors(choice.lake):
-                self._fill(tables, listed)
-            shut_in(self.connection, files=self._local_files)
+                self._fill(tables, views)
+            shut_in(self.connection, files=self._files)
         except BaseException:
             self.close()
             raise
 
-    def _fill(self, tables: Sequence[str] | None, listed: bool) -> None:
-        con = self.connection
+    def _fill(self, tables: Iterable[str], views: Iterable[str]) -> None:
+        con, runs = self.connection, self.choice.runs
         # A query that needs more than the memory fails: there is no good place for spilled files.
         con.execute("SET temp_directory = ''")
         # DuckDB looks at the files of a view when it makes the view, and when it reads the view.
         con.execute("SET parquet_metadata_cache = true")
-        con.register("chosen_run", self.choice.runs)
-        con.execute(f"CREATE TABLE {RUN} AS FROM chosen_run")
-        con.unregister("chosen_run")
-        con.execute(f"CREATE SCHEMA {identifier(VIEWS)}")
-        made = self._made(tables, listed)
-        if tables is None or listed:
-            views = {f"{VIEWS}/{name}" for name in self.choice.lake.store.folders(VIEWS)}
-            tables = [*ANSWERS, *sorted(views | made.keys())]
+        with registered(con, chosen_run=runs):
+            con.execute(f"CREATE TABLE {RUN} AS FROM chosen_run")
+        parts = [part for part in runs["part"].to_pylist() if part is not None]
         for table in tables:
-            is_view = table.startswith(f"{VIEWS}/")
-            found = self._files(table, "view_part" if is_view else "part")
-            scans = [self._scan(table, found)] if found else []
-            if table in made:
-                scans.append(self._local_scan(f"made of {table}", made[table]))
-            if not scans:
+            paths = [part_path(table, part) for part in parts]
+            self._add(table, self.choice.lake.store.local_files(paths, self._folder))
+        con.execute(f"CREATE SCHEMA {VIEWS}")
+        for view, files in self._of_databases(list(views)).items():
+            self._add(f"{VIEWS}.{view}", files)
+
+    def _add(self, name: str, files: list[str]) -> None:
+        """Make a view of the rows in some files."""
+        if not files:
+            return
+        self._files += files
+        self.connection.execute(f"SET VARIABLE {identifier(name)} = $files", {"files": files})
+        self.connection.execute(
+            f"CREATE VIEW {name} AS SELECT * EXCLUDE (part) "
+            f"FROM read_parquet(getvariable({literal(name)}), union_by_name = true) {self._join}"
+        )
+
+    def _of_databases(self, views: Sequence[str]) -> dict[str, list[str]]:
+        """Write the rows that databases of the runs have in some views, and return the files."""
+        files: dict[str, list[str]] = {}
+        for run in self.choice.runs.to_pylist() if views else ():
+            if run["database_part"] is None:
                 continue
-            self.tables.add(table)
-            name = ".".join(map(identifier, table.split("/")))
-            part = "coalesce(r.view_part, r.database_part)" if is_view else "r.part"
-            con.execute(
-                f"CREATE VIEW {name} AS SELECT t.* EXCLUDE (part) "
-                f"FROM (FROM {' UNION ALL BY NAME FROM '.join(scans)}) AS t "
-                f"SEMI JOIN main.{RUN} AS r ON t.run = r.run AND t.part = {part}"
-            )
-
-    def _made(self, tables: Sequence[str] | None, listed: bool) -> dict[str, list[str]]:
-        """Write views that runs have in their databases only, and return the files of each.
-
-        `listed` also writes all views of the first run, so that their names and columns are known.
-        """
-        wanted = (
-            None if tables is None else {each for each in tables if each.startswith(f"{VIEWS}/")}
-        )
-        runs = [
-            run
-            for run in self.choice.runs.to_pylist()
-            if run["view_part"] is None and run["database_part"] is not None
-        ]
-        if not runs or not (wanted is None or wanted or listed):
-            return {}
-        folder = Path(self.enter_context(tempfile.TemporaryDirectory(prefix="msgflow-")))
-        made: dict[str, list[str]] = {}
-        for run in runs:
-            # The part of such views is that of the database, which is in the folder for a moment.
-            part = run["database_part"]
-            with run_database(self.choice.lake, run, folder) as connection:
-                for name in public_views(connection):
-                    view = f"{VIEWS}/{name}"
-                    if wanted is None or view in wanted or listed:
-                        file = folder / view_path(name, part)
-                        file.parent.mkdir(parents=True, exist_ok=True)
-                        rows = view_rows(connection, name)
-                        write_rows(file, name, rows, {KEY: run["run"], PART: part}, "")
-                        made.setdefault(view, []).append(str(file))
-            listed = False
-        return made
-
-    def _files(self, table: str, key: str) -> dict[str, str]:
-        """Return the files of a table, each with the version that wrote it; earlier may lack it."""
-        runs = self.choice.runs
-        written_by = zip(runs[key].to_pylist(), runs["msgflow_version"].to_pylist(), strict=True)
-        wanted = {
-            part_path(table, part): version for part, version in written_by if part is not None
-        }
-        there = {entry.path for entry in self.choice.lake.store.entries(table, recursive=False)}
-        have_it = {version for path, version in wanted.items() if path in there}
-        if table in ANSWERS:
-            have_it.add(__version__)
-        for path, version in sorted(wanted.items()):
-            if path not in there and version in have_it:
-                raise FileNotFoundError(f"a file is gone: {path}")
-        return {path: version for path, version in sorted(wanted.items()) if path in there}
-
-    def _local_scan(self, name: str, paths: list[str]) -> str:
-        self._local_files += paths
-        self.connection.execute(f"SET VARIABLE {identifier(name)} = $paths", {"paths": paths})
-        return f"read_parquet(getvariable({literal(name)}), union_by_name = true)"
-
-    def _scan(self, table: str, files: dict[str, str]) -> str:
-        store = self.choice.lake.store
-        name = f"files of {table}"
-        paths = [store.full(path) for path in files]
-        if store.is_local:
-            return self._local_scan(name, paths)
-        # Only here: it imports pandas, if that is installed.
-        import pyarrow.dataset as ds
-
-        system = store.filesystem
-        # Files of one version have the same columns.
-        one = {version: store.full(path) for path, version in files.items()}
-        schemas = [pq.read_schema(path, filesystem=system) for path in one.values()]
-        schema = pa.unify_schemas(
-            [each.remove_metadata() for each in schemas], promote_options="permissive"
-        )
-        dataset: Any = ds.FileSystemDataset.from_paths(
-            paths, schema=schema, format=ds.ParquetFileFormat(), filesystem=system
-        )
-        if len(self.choice.runs) < self.choice.total:
-            # Large files: read only the groups of rows with one of the runs.
-            keys = self.choice.runs["run"].combine_chunks()
-            dataset = dataset.filter(ds.field("run").isin(keys))
-        self.connection.register(name, dataset)
-        return identifier(name)
+            with run_database(self.choice.lake, run, self._folder) as connection:
+                there = connection.execute(_VIEWS_AMONG, {"names": views}).fetchall()
+                for (view,) in there:
+                    file = self._folder / f"{run['run']}.{view}.parquet"
+                    rows = connection.sql(f'FROM main."{view}"').to_arrow_reader(ROWS_AT_ONCE)
+                    write_rows(file, view, rows, {KEY: run["run"], PART: run["part"]}, "")
+                    files.setdefault(view, []).append(str(file))
+        return files
 
 
 @contextmanager
@@ -253,8 +195,7 @@ def lake_errors(lake: Lake, *, is_query: bool = False) -> Iterator[None]:
     try:
         yield
     except (duckdb.Error, OSError) as error:
-        is_of_files = isinstance(error, duckdb.IOException | OSError) or _STREAM in str(error)
-        if is_query and not is_of_files:
+        if is_query and not isinstance(error, duckdb.IOException | OSError):
             raise
         raise DatabaseError(
             f"cannot read the lake: {first_line(error)} — {lake.store.url}",

@@ -19,10 +19,17 @@ import duckdb
 import pyarrow as pa
 
 from msgflow.database import guarded_rows, sql_error
+from msgflow.db.sandbox import open_memory
 from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.lake_connection import Choice, Reading, choose, lake_errors, what_there_is
-from msgflow.fleet.layout import VIEWS
+from msgflow.fleet.lake_connection import (
+    VIEWS,
+    Choice,
+    Reading,
+    choose,
+    lake_errors,
+    what_there_is,
+)
 from msgflow.fleet.part import ANSWERS
 from msgflow.query.catalogue import choose_query, load_query, queries_meant
 from msgflow.query.runner import bind, shown_rows
@@ -32,17 +39,16 @@ from msgflow.sql.failure import first_line
 from msgflow.sql.header import Column, Header, relations_of
 from msgflow.sql.interrupt import interruptible
 from msgflow.sql.quoting import identifier
-from msgflow.sql.statement import Statements
+from msgflow.sql.statement import Statements, registered
 from msgflow.sql.value import Value
 from msgflow.text.name_suggestions import did_you_mean
 
 GROUP = "label_group"
 WORST = "worst"
 DEFAULT_LIMIT = 10
-# Words of SQL that look at tables without naming them.
-_LISTS = re.compile(
-    r"\b(show|describe|summarize|information_schema|duckdb_\w+|pragma_\w+)\b", re.IGNORECASE
-)
+# Words of SQL that look at tables without naming them, and those that name public views.
+_LISTS = re.compile(r"\b(show|information_schema|duckdb_\w+)\b", re.IGNORECASE)
+_OF_VIEWS = re.compile(rf"\b{VIEWS}\W+(\w+)", re.IGNORECASE)
 # What DuckDB says where files lack a column, that of a statement or one among its COLUMNS.
 _LACKING = re.compile(r'(?:does not have a column named|Column) "(\w+)"')
 _BUCKETS = "distributed"
@@ -108,10 +114,9 @@ def fleet_query(
         del own[variant.name]
     chosen = make_selection(dict(selection or {}), lake_names)
     choice = choose(lake, where)
-    with Reading(choice, _tables(header)) as reading:
+    grouped, groups = _grouped(choice, header, group_by)
+    with Reading(choice, _tables(header), groups=groups) as reading:
         con = reading.connection
-        _require_tables(reading, header)
-        grouped = _group(con, choice, header, group_by)
         sql, bindings = selected(grouped, chosen, internal)
         table = _asked(lake, name, con, lambda: con.sql(sql, params=own | bindings))
     table, missing, _ = shown_rows(table, internal=internal)
@@ -138,16 +143,17 @@ def fleet_sql(
     """Run SQL that only reads on the tables of a lake."""
     choice = choose(lake, where)
     try:
-        listed = _LISTS.search(text) is not None
-        with Reading(choice, _named_tables(text), listed=listed) as reading:
+        words = set(re.findall(r"\w+", text.lower()))
+        tables = ANSWERS if _LISTS.search(text) else [name for name in ANSWERS if name in words]
+        with Reading(choice, tables, _OF_VIEWS.findall(text.lower())) as reading:
             con = reading.connection
             with lake_errors(lake, is_query=True):
                 return guarded_rows(con, text, "msgflow fleet sql 'FROM run'", limit)
     except duckdb.Error as error:
         said = sql_error(error, "ask about fewer runs with --where")
-        parts = [*choice.runs["view_part"].to_pylist(), *choice.runs["database_part"].to_pylist()]
-        if isinstance(error, duckdb.CatalogException) and not any(parts):
-            said.hint = "these runs have no views: --no-database left them out, and not --views"
+        has_database = any(choice.runs["database_part"].to_pylist())
+        if isinstance(error, duckdb.CatalogException) and not has_database:
+            said.hint = "these runs have no views: --no-database left out their databases"
         raise said from error
 
 
@@ -159,7 +165,6 @@ def fleet_worst(
     choice = choose(lake, where)
     with Reading(choice, _tables(header)) as reading:
         con = reading.connection
-        _require_tables(reading, header)
         values = {"path": path, "count": limit}
         table = _asked(lake, WORST, con, lambda: STATEMENTS.run(con, WORST, values))
     if not len(table):
@@ -167,10 +172,12 @@ def fleet_worst(
             f"no flow of these runs reached the end of a path with this text — {path}",
             f"msgflow fleet query e2e-latency --lake {shlex.quote(lake.store.url)}",
         )
+    databases = dict(
+        zip(choice.runs["run"].to_pylist(), choice.runs["database_part"].to_pylist(), strict=True)
+    )
     # SQL does not know the commands of a shell; these are few rows.
-    commands = [_command(lake, row) for row in table.to_pylist()]
+    commands = [_command(lake, row) if databases[row["run"]] else None for row in table.to_pylist()]
     table = table.append_column("command", pa.array(commands, pa.string()))
-    table = table.drop_columns(["has_database"])
     notes = []
     if commands[0] is not None:
         # The screen may have no room for the column.
@@ -178,13 +185,10 @@ def fleet_worst(
     if None in commands:
         notes.append("runs without a command were written with --no-database")
     meaning = Column("command", "VARCHAR", None, "What opens the flow")
-    columns = (*(column for column in header.columns if column.name != "has_database"), meaning)
-    return QueryResult(table, replace(header, columns=columns), notes=notes)
+    return QueryResult(table, replace(header, columns=(*header.columns, meaning)), notes=notes)
 
 
-def _command(lake: Lake, row: Mapping[str, Any]) -> str | None:
-    if not row["has_database"]:
-        return None
+def _command(lake: Lake, row: Mapping[str, Any]) -> str:
     option = f"--{row['root_kind'].replace('_', '-')}"
     opening = ["msgflow", "fleet", "open", row["run"], "--lake", lake.store.url]
     flow = ["msgflow", "flow", "--db", f"{row['run']}.duckdb", option, str(row["root_id"])]
@@ -196,26 +200,8 @@ def _tables(header: Header) -> list[str]:
     return sorted(read.intersection(ANSWERS))
 
 
-def _require_tables(reading: Reading, header: Header) -> None:
-    for table in _tables(header):
-        if table not in reading.tables:
-            raise UsageError(
-                f"these runs lack a table, an earlier msgflow wrote them — {table}",
-                "msgflow fleet ingest SOURCE --lake LAKE --replace writes them again",
-            )
-
-
-def _named_tables(text: str) -> list[str]:
-    words = set(re.findall(r"\w+", text.lower()))
-    return [name for name in sorted(ANSWERS) if name in words] + (
-        [f"{VIEWS}/{word}" for word in sorted(words)] if VIEWS in words else []
-    )
-
-
-def _group(
-    con: duckdb.DuckDBPyConnection, choice: Choice, header: Header, group_by: Sequence[str]
-) -> Header:
-    """Make a table with the group of each run; return the query with the labels of groups."""
+def _grouped(choice: Choice, header: Header, group_by: Sequence[str]) -> tuple[Header, pa.Table]:
+    """Return a query with the labels of groups, and the group of each run: a list of labels."""
     taken = {column.name.lower() for column in header.columns}
     fields = set(choice.runs.column_names) - {"labels"}
     values, bound = [], {}
@@ -233,28 +219,19 @@ def _group(
             )
         title = f"label_{name}" if name.lower() in taken else name
         columns.append(Column(title, "VARCHAR", None, f"Value of {name}"))
+    group = f"SELECT run, [{', '.join(values)}]::VARCHAR[] AS {GROUP} FROM known_run"
+    with open_memory() as con, registered(con, known_run=choice.runs):
+        groups = con.sql(group, params=bound).to_arrow_table()
     listed = "".join(
-        f", {value} AS {identifier(column.name)}"
-        for value, column in zip(values, columns, strict=True)
+        f"{GROUP}[{place}] AS {identifier(column.name)}, "
+        for place, column in enumerate(columns, 1)
     )
-    number = f"dense_rank() OVER (ORDER BY {', '.join(values)})" if values else "1::BIGINT"
-    rows = con.sql(f"SELECT run, {number} AS {GROUP} FROM run", params=bound)
-    con.register("run_group", rows.to_arrow_table())
-    kept = tuple(column for column in header.columns if column.name != GROUP)
     text = STATEMENTS.text(header.name).rstrip().rstrip(";")
-    if not columns:
-        body = f"SELECT * EXCLUDE ({GROUP}) FROM (\n{text}\n)"
-        return replace(header, columns=kept, body=body)
-    labels = con.sql(f"SELECT DISTINCT {number} AS {GROUP}{listed} FROM run", params=bound)
-    con.register("group_label", labels.to_arrow_table())
-    body = (
-        "SELECT l.* EXCLUDE (label_group), q.* EXCLUDE (label_group, place) FROM ("
-        f"SELECT row_number() OVER () AS place, * FROM (\n{text}\n)) AS q "
-        f"JOIN group_label AS l ON q.{GROUP} = l.{GROUP} ORDER BY q.place"
-    )
-    first = tuple(column.name for column in columns)
+    body = f"SELECT {listed}* EXCLUDE ({GROUP}) FROM (\n{text}\n)"
+    kept = (column for column in header.columns if column.name != GROUP)
+    first = (column.name for column in columns)
     brief = (*header.brief[:1], *first, *header.brief[1:])
-    return replace(header, columns=(*columns, *kept), body=body, brief=brief)
+    return replace(header, columns=(*columns, *kept), body=body, brief=brief), groups
 
 
 def _asked(

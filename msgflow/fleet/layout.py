@@ -19,16 +19,12 @@ from msgflow.version import __version__
 LAKE_REVISION = 3
 ABOUT = "lake.json"
 RUN = "run"
-PACKED = "packed"
 FAILURE = "fleet_failure"
-VIEWS = "view"
 DATABASE = "database"
-_LARGE = 1_000_000
 _FORMAT = "msgflow lake"
-_PACK = re.compile(r"pack-[0-9a-f]{10}-(\d{1,9})")
 # A name without a part is one of a killed writer: it has a dot before it and .part behind.
 _FILE = re.compile(
-    rf"(?:.+/)?(?:(?P<part>[0-9a-f]{{20}}-[0-9a-f]{{10}}|{_PACK.pattern})\.(?:parquet|duckdb\.zst)"
+    r"(?:.+/)?(?:(?P<part>[0-9a-f]{20}-[0-9a-f]{10})\.(?:parquet|duckdb\.zst)"
     r"|\.[^/]+\.(?:parquet|zst)\.[^/]+\.part)"
 )
 
@@ -66,20 +62,9 @@ def new_part(run: str) -> str:
     return f"{run}-{secrets.token_hex(5)}"
 
 
-def new_pack(runs: int) -> str:
-    """Return the name of a new part with the answers of many runs, and their number."""
-    return f"pack-{secrets.token_hex(5)}-{runs}"
-
-
-def packed_runs(part: str) -> int:
-    """Return how many runs were put into a part; 0 if it was written for one run."""
-    found = _PACK.fullmatch(part)
-    return int(found[1]) if found else 0
-
-
-def run_path(name: str) -> str:
-    """Return the path of the row of a run, by its key, or of all that were `PACKED`."""
-    return f"{RUN}/{name}.parquet"
+def run_path(key: str) -> str:
+    """Return the path of the row of a run."""
+    return f"{RUN}/{key}.parquet"
 
 
 def failure_path(source: str) -> str:
@@ -90,11 +75,6 @@ def failure_path(source: str) -> str:
 def part_path(table: str, part: str) -> str:
     """Return the path of the rows of a table in a part."""
     return f"{table}/{part}.parquet"
-
-
-def view_path(view: str, part: str) -> str:
-    """Return the path of the rows of a public view in a part."""
-    return part_path(f"{VIEWS}/{view}", part)
 
 
 def database_path(part: str) -> str:
@@ -118,14 +98,12 @@ def metadata(table: str, schema_revision: str) -> dict[str, str]:
     }
 
 
-def read_parquet(content: bytes, schema: pa.Schema | None = None) -> pa.Table:
-    """Return the rows of a Parquet file, without pandas and without columns from folder names."""
+def read_parquet(content: bytes, schema: pa.Schema) -> pa.Table:
+    """Return the rows of a Parquet file with these columns, without pandas."""
     # `read_table` would import pandas if that is installed.
     file = pyarrow.parquet.ParquetFile(pa.BufferReader(content))
-    # Most files have one row: threads would cost more than they save.
-    table = file.read(use_threads=len(content) > _LARGE).replace_schema_metadata()
-    if schema is None:
-        return table
+    # Files have one row: threads would cost more than they save.
+    table = file.read(use_threads=False).replace_schema_metadata()
     if table.schema.equals(schema):
         return pa.Table.from_arrays(table.columns, schema=schema)
     columns = [
@@ -146,7 +124,6 @@ def _schema(*columns: tuple[str, pa.DataType, str]) -> pa.Schema:
 RUN_SCHEMA = _schema(
     ("run", pa.string(), "Key of the run, made of the identity of its packets"),
     ("part", pa.string(), "Where its answers lie: TABLE/PART.parquet"),
-    ("view_part", pa.string(), "Where its views lie: view/VIEW/PART.parquet; NULL: nowhere"),
     ("database_part", pa.string(), "Where its database lies: database/PART…; NULL: nowhere"),
     ("name", pa.string(), "Name of the run, from that of its source"),
     ("source", pa.string(), "Path or address that it was read from"),
@@ -163,7 +140,7 @@ RUN_SCHEMA = _schema(
     ("seconds", pa.float64(), "How long fetching, ingesting and writing took"),
     ("tries", pa.int32(), "How often it was tried"),
     ("worker", pa.string(), "Machine that did it"),
-    ("committed_ns", pa.int64(), "When the run was put here [epoch ns]; the last counts"),
+    ("committed_ns", pa.int64(), "When the run was put here [epoch ns]"),
 )
 """The columns of the table `run`."""
 

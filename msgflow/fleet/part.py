@@ -16,10 +16,9 @@ import pyarrow as pa
 import pyarrow.parquet
 
 from msgflow.db.connection import recorded_revision
-from msgflow.db.objects import public_names
 from msgflow.errors import TraceError
 from msgflow.fleet.file_store import Store
-from msgflow.fleet.layout import RUN, database_path, metadata, new_part, part_path, view_path
+from msgflow.fleet.layout import database_path, metadata, new_part, part_path
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
@@ -27,10 +26,8 @@ from msgflow.sql.statement import internal_sql
 from msgflow.version import __version__
 
 KEY, PART = "run", "part"
-_ROWS_AT_ONCE = 100_000
+ROWS_AT_ONCE = 100_000
 _RUN_ID = "run_id"
-# Public views that a lake does not hold: its own table `run` has the useful columns.
-_LEFT_OUT = (RUN,)
 # Those of statements of the program; buckets of a distribution can be added up.
 _OWN = ("flow", "distribution")
 _FINDING = "finding"
@@ -55,12 +52,11 @@ def write_part(
     store: Store,
     scratch: Path,
     *,
-    views: bool = False,
     database: bool = True,
 ) -> dict[str, Any]:
     """Write all files of the only run of a database, and return its row as far as that knows it.
 
-    `views` are the public views, `database` is the file of the database itself.
+    `database` says whether the file of the database itself is one of them.
     """
     ((run_id, name, start_ns, end_ns, event_count),) = connection.execute(
         "SELECT run_id, name, start_ns, end_ns, event_count FROM main.run"
@@ -71,13 +67,9 @@ def write_part(
     first = {KEY: key, PART: part}
     table, compressed = scratch / "table.parquet", scratch / "compressed"
     for each in ANSWERS:
-        rows = _answer(connection, run_id, each).to_reader(_ROWS_AT_ONCE)
+        rows = _answer(connection, run_id, each).to_reader(ROWS_AT_ONCE)
         write_rows(table, each, rows, first, revision)
         store.put(part_path(each, part), table)
-    if views:
-        for view in public_views(connection):
-            write_rows(table, view, view_rows(connection, view), first, revision)
-            store.put(view_path(view, part), table)
     if database:
         with file.open("rb") as source, pa.CompressedOutputStream(str(compressed), "zstd") as sink:
             shutil.copyfileobj(source, sink, 1 << 20)
@@ -85,7 +77,6 @@ def write_part(
     return {
         KEY: key,
         PART: part,
-        "view_part": part if views else None,
         "database_part": part if database else None,
         "name": name,
         "start_ns": start_ns,
@@ -105,26 +96,6 @@ def _answer(con: duckdb.DuckDBPyConnection, run_id: int, table: str) -> pa.Table
         return con.sql(statement, params={"run_id": run_id}).to_arrow_table()
     query = load_query(table.replace("_", "-"))
     return run_query(con, query, {}, Slice(run_id), internal=True).to_arrow()
-
-
-def public_views(connection: duckdb.DuckDBPyConnection) -> list[str]:
-    """Return the names of the public views that a lake may hold.
-
-    A database may have others, with any name: what is no view of msgflow becomes no path.
-    """
-    found = connection.execute(
-        "SELECT view_name FROM duckdb_views() WHERE database_name = current_database() "
-        "AND schema_name = 'main' AND NOT internal ORDER BY view_name"
-    ).fetchall()
-    known = set(public_names()).difference(_LEFT_OUT)
-    return [name for (name,) in found if name in known]
-
-
-def view_rows(connection: duckdb.DuckDBPyConnection, view: str) -> pa.RecordBatchReader:
-    """Return the rows of a public view in a fixed order."""
-    # A name of the catalogue: it needs no more than quotes.
-    relation = connection.sql(f'SELECT * FROM main."{view}" ORDER BY ALL')
-    return relation.to_arrow_reader(_ROWS_AT_ONCE)
 
 
 def write_rows(

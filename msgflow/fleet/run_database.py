@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import duckdb
@@ -18,6 +17,7 @@ import pyarrow as pa
 from msgflow.db.connection import connect
 from msgflow.db.migration import upgrade
 from msgflow.errors import DatabaseError, MsgflowError, UsageError
+from msgflow.files.temporary_owner import temporary_directory
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import database_path
 from msgflow.fleet.part import run_key
@@ -57,11 +57,9 @@ def open_run(lake: Lake, run: str, path: Path | None = None) -> OpenedRun:
             f"msgflow ingest {shlex.quote(row['source'] or '')}",
         )
     try:
-        with TemporaryDirectory(prefix=f".{target.name}.", dir=target.parent) as folder:
-            aside = Path(folder) / target.name
-            _fetch(lake, row, aside)
-            before = _upgraded(lake, row, aside)
-            _opened(lake, row, aside).close()
+        with temporary_directory(f".{target.name}.", str(target.parent)) as folder:
+            aside = folder / target.name
+            before = _restore(lake, row, aside)
             try:
                 # This fails if the file exists by now.
                 os.link(aside, target)
@@ -83,13 +81,8 @@ def run_database(
     """Open the database of a run for reading, in a file of this folder that is gone afterwards."""
     file = folder / f"{row['run']}.duckdb"
     try:
-        _fetch(lake, row, file)
-        try:
-            con = _opened(lake, row, file)
-        except DatabaseError:  # an earlier msgflow made it
-            _upgraded(lake, row, file)
-            con = _opened(lake, row, file)
-        with contextlib.closing(con):
+        _restore(lake, row, file)
+        with contextlib.closing(connect(file, read_only=True)) as con:
             yield con
     finally:
         file.unlink(missing_ok=True)
@@ -113,62 +106,59 @@ def _row(lake: Lake, run: str) -> dict[str, Any]:
     return found[0]
 
 
-def _fetch(lake: Lake, row: Mapping[str, Any], target: Path) -> None:
+def _restore(lake: Lake, row: Mapping[str, Any], target: Path) -> str | None:
+    """Write the database of a run into a new file, upgraded.
+
+    Returns:
+        Its schema revision before, None if that was the current one.
+    """
     path = database_path(row["database_part"])
-    if lake.store.entry(path) is None:
-        raise DatabaseError(
-            f"the database of the run is gone — {lake.store.url_of(path)}",
-            "msgflow fleet ingest SOURCE --lake LAKE --replace writes it again",
-        )
     packed = target.with_name(f"{target.name}.zst")
+    if lake.store.entry(path) is None:
+        raise _unusable(lake, path, "it is gone")
+    lake.store.fetch(path, packed)
     try:
-        lake.store.fetch(path, packed)
-        limit, size = limit_of(packed.stat().st_size), 0
-        with pa.CompressedInputStream(str(packed), "zstd") as source, target.open("xb") as file:
-            while chunk := source.read(_CHUNK):
-                size += len(chunk)
-                if size > limit:
-                    raise DatabaseError(
-                        f"the database has more than {limit:,} bytes unpacked,"
-                        f" {packed.stat().st_size:,} packed — {lake.store.url_of(path)}",
-                        f"{LIMIT_VARIABLE}=100GB msgflow fleet open … reads it, if you know who"
-                        " made it",
-                    )
-                file.write(chunk)
+        _unpack(packed, target, lake.store.url_of(path))
     except OSError as error:
         if error.errno is not None:
             raise
-        raise _damaged(lake, row, str(error)) from error
-    finally:
-        packed.unlink(missing_ok=True)
-
-
-def _upgraded(lake: Lake, row: Mapping[str, Any], file: Path) -> str | None:
-    """Upgrade a database and return its revision before; None if it was the current one."""
+        # Arrow says so of what is not compressed, or not whole.
+        raise _unusable(lake, path, str(error)) from error
+    packed.unlink()
+    before = None
     try:
-        done = upgrade(file)
+        try:
+            con = connect(target, read_only=True)
+        except DatabaseError:  # an earlier msgflow made it
+            done = upgrade(target)
+            before = done.before if done.before != done.after else None
+            con = connect(target, read_only=True)
+        with contextlib.closing(con):
+            ids = con.execute("SELECT run_id FROM main.run").fetchall()
+            is_it = len(ids) == 1 and run_key(con, ids[0][0]) == row["run"]
     except MsgflowError as error:
-        raise _damaged(lake, row, error.message.partition(" — ")[0]) from error
-    return done.before if done.before != done.after else None
-
-
-def _opened(lake: Lake, row: Mapping[str, Any], file: Path) -> duckdb.DuckDBPyConnection:
-    """Open a database for reading; raise if it is not that of the run."""
-    try:
-        con = connect(file, read_only=True)
-        ids = con.execute("SELECT run_id FROM main.run").fetchall()
-        is_it = len(ids) == 1 and run_key(con, ids[0][0]) == row["run"]
-    except MsgflowError as error:
-        raise _damaged(lake, row, error.message.partition(" — ")[0]) from error
+        raise _unusable(lake, path, error.message.partition(" — ")[0]) from error
     if not is_it:
-        con.close()
-        raise _damaged(lake, row, "it is that of another run")
-    return con
+        raise _unusable(lake, path, "it is that of another run")
+    return before
 
 
-def _damaged(lake: Lake, row: Mapping[str, Any], words: str) -> DatabaseError:
+def _unpack(packed: Path, target: Path, url: str) -> None:
+    most, size = limit_of(packed.stat().st_size), 0
+    with pa.CompressedInputStream(str(packed), "zstd") as source, target.open("xb") as file:
+        while chunk := source.read(_CHUNK):
+            size += len(chunk)
+            if size > most:
+                raise DatabaseError(
+                    f"the database has more than {most:,} bytes unpacked — {url}",
+                    f"{LIMIT_VARIABLE}=100GB msgflow … reads it, if you know who made it",
+                )
+            file.write(chunk)
+
+
+def _unusable(lake: Lake, path: str, words: str) -> DatabaseError:
+    url = lake.store.url_of(path)
     return DatabaseError(
-        f"the database in the lake cannot be used: {words}"
-        f" — {lake.store.url_of(database_path(row['database_part']))}",
+        f"the database in the lake cannot be used: {words} — {url}",
         "msgflow fleet ingest SOURCE --lake LAKE --replace writes it again",
     )

@@ -1,7 +1,7 @@
 """Sources that users type, resolved to recordings: paths, addresses, patterns and manifests.
 
-A manifest is a list of recordings with their labels, as CSV, JSONL or Parquet. What files a
-recording has tells whether it has changed.
+A manifest is a list of recordings with their labels, as CSV. What files a recording has tells
+whether it has changed.
 """
 
 from __future__ import annotations
@@ -11,28 +11,23 @@ import fnmatch
 import glob
 import hashlib
 import io
-import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
-
-import pyarrow as pa
 
 from msgflow.db.runs import require_label
 from msgflow.errors import TraceError, UsageError
 from msgflow.files.text_file import MOST_BYTES
 from msgflow.fleet.file_store import S3, Store, normal_url
-from msgflow.fleet.layout import read_parquet
 from msgflow.trace.archive import SUFFIXES
 
-_MANIFESTS = (".csv", ".jsonl", ".parquet")
+_MANIFEST = ".csv"
 PATH = "path"
 # A recording takes some hundred bytes: this is enough for any fleet.
 _MOST_BYTES = 100 * MOST_BYTES
 # One row: its place, for messages, and its values as text.
-_Row = tuple[str, dict[str, str | None]]
+_Row = tuple[str, dict[str, str]]
 
 
 @dataclass(frozen=True)
@@ -81,7 +76,7 @@ def _of(source: str) -> list[Recording]:
             raise UsageError(f"nothing fits the pattern — {source}", "check the path")
     found: list[Recording] = []
     for name in names:
-        is_manifest = name.lower().endswith(_MANIFESTS)
+        is_manifest = name.lower().endswith(_MANIFEST)
         found += read_manifest(name) if is_manifest else [Recording(normal_url(name))]
     return found
 
@@ -97,44 +92,30 @@ def _in_bucket(pattern: str) -> list[str]:
         found = [
             f"{url}/{name}"
             for url in found
-            for name in _names(Store(url))
+            for name in Store(url).names()
             if fnmatch.fnmatchcase(name, segment)
         ]
     return sorted(found)
-
-
-def _names(store: Store) -> list[str]:
-    return sorted({*store.folders(), *(e.path for e in store.entries(recursive=False))})
 
 
 def read_manifest(source: str) -> list[Recording]:
     """Return the recordings of a manifest, in its order.
 
     Each has a path; a relative one starts in the folder of the manifest. All other columns are
-    labels, taken as text; an empty value means no label. Equal rows count once.
+    labels, taken as text; an empty value means no label.
     """
     url = normal_url(source)
     folder, _, name = url.rpartition("/")
     content = Store(folder or "/").read(name, _MOST_BYTES)
     if content is None:
         raise UsageError(f"no such manifest — {source}", "check the path")
-    rows = list(_rows(content, source))
-    if not rows:
+    found = [_recording(place, values, folder, source) for place, values in _rows(content, source)]
+    if not found:
         raise UsageError(f"the manifest is empty — {source}", "a column path, and a row for each")
-    found: dict[str, tuple[Recording, str]] = {}
-    for place, values in rows:
-        recording = _recording(place, values, folder, source)
-        earlier, first = found.setdefault(recording.source, (recording, place))
-        if earlier != recording:
-            raise UsageError(
-                f"the manifest says two things of one recording, in {first} and {place}"
-                f" — {values[PATH]}",
-                "leave out one of the two",
-            )
-    return [recording for recording, _ in found.values()]
+    return found
 
 
-def _recording(place: str, values: Mapping[str, str | None], folder: str, source: str) -> Recording:
+def _recording(place: str, values: Mapping[str, str], folder: str, source: str) -> Recording:
     path = values.get(PATH)
     if not path:
         raise UsageError(f"a row without a path, in {place} — {source}", f"fill in {PATH}")
@@ -149,25 +130,16 @@ def _recording(place: str, values: Mapping[str, str | None], folder: str, source
 
 
 def _rows(content: bytes, source: str) -> Iterator[_Row]:
-    if source.lower().endswith(".parquet"):
-        yield from _parquet(content, source)
-        return
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise UsageError(f"the manifest is not UTF-8 — {source}", "save it as UTF-8") from error
-    yield from (_jsonl if source.lower().endswith(".jsonl") else _csv)(text, source)
-
-
-def _csv(text: str, source: str) -> Iterator[_Row]:
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         names = next(reader, [])
         _require_columns(names, source)
-        for values in reader:
+        for values in filter(None, reader):
             place = f"line {reader.line_num}"
-            if not values:
-                continue
             if len(values) != len(names):
                 raise UsageError(
                     f"{len(values)} values for {len(names)} columns, in {place} — {source}",
@@ -179,33 +151,6 @@ def _csv(text: str, source: str) -> Iterator[_Row]:
             f"cannot read the manifest: {error}, in line {reader.line_num} — {source}",
             "a quote inside of quotes is written twice",
         ) from error
-
-
-def _jsonl(text: str, source: str) -> Iterator[_Row]:
-    for number, line in enumerate(text.split("\n"), 1):
-        if not line.strip():
-            continue
-        try:
-            values = json.loads(line)
-        except (ValueError, RecursionError) as error:
-            raise UsageError(
-                f"cannot read the manifest: {error}, in line {number} — {source}",
-                "one JSON object a line",
-            ) from error
-        if not isinstance(values, dict):
-            raise UsageError(f"no object, in line {number} — {source}", '{"path": "…", …}')
-        _require_columns(list(values), source)
-        yield f"line {number}", {key: _text(value, key) for key, value in values.items()}
-
-
-def _parquet(content: bytes, source: str) -> Iterator[_Row]:
-    try:
-        table = read_parquet(content)
-    except (pa.ArrowException, OSError) as error:
-        raise UsageError(f"cannot read the manifest — {source}", "is it Parquet?") from error
-    _require_columns(table.column_names, source)
-    for number, values in enumerate(table.to_pylist(), 1):
-        yield f"row {number}", {key: _text(value, key) for key, value in values.items()}
 
 
 def _require_columns(names: list[str], source: str) -> None:
@@ -224,23 +169,6 @@ def _require_columns(names: list[str], source: str) -> None:
                 require_label(name, None)
             except UsageError as error:
                 raise UsageError(f"{error.message}, a column of {source}", error.hint) from error
-
-
-def _text(value: Any, key: str) -> str | None:
-    if isinstance(value, str):
-        try:
-            value.encode()
-        except UnicodeEncodeError as error:
-            raise UsageError(
-                f"a value that is no text: half of a character — {key}", "save it as UTF-8"
-            ) from error
-    if value is None or isinstance(value, str):
-        return value
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, dict | list | bytes):
-        raise UsageError(f"a label is a text or a number — {key}", "give one value")
-    return str(value)
 
 
 def look_at(source: str) -> State:

@@ -10,6 +10,7 @@ import contextlib
 import errno
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -26,6 +27,8 @@ from msgflow.files.temporary_owner import temporary_directory
 # Variables with secrets, which messages of libraries could repeat.
 _SECRETS = ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN")
 _MEGABYTE = 1_000_000
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+_FULL_WORDS = re.compile("no space left|not enough free|disk quota", re.IGNORECASE)
 # Files in which the process of a task says what it is doing, and its outcome.
 STAGE, RESULT = "stage", "result.json"
 _PREFIX = "msgflow-fleet."
@@ -63,12 +66,10 @@ class Options:
 
     # Options of the ingest: reader, strict, ignore, events, clock_sync.
     ingest: dict[str, Any] = field(default_factory=dict)
-    views: bool = False  # also write the public views
     database: bool = True  # also write the database
     replace: bool = False  # ingest recordings again that the lake has already
     retry_failed: bool = False  # ingest recordings again that failed before
     tries: int = 3  # most tries of a recording, if another one may succeed
-    pause: float = 2.0  # seconds before the second try; twice as many before each further one
     timeout: float = 3600.0  # most seconds of one recording
     memory: int | None = None  # most bytes of one recording
     scratch: str | None = None  # folder of each worker for temporary files, absolute
@@ -108,7 +109,7 @@ def run_task(task: Task) -> Outcome:
         with temporary_directory(_PREFIX, task.scratch) as directory:
             outcome = _watched(task, directory, begin + task.timeout)
     except OSError as error:
-        is_full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        is_full = is_disk_full(error)
         outcome = Outcome(
             Reason.NO_SPACE if is_full else Reason.NO_SCRATCH,
             "making scratch space",
@@ -187,6 +188,11 @@ def needs(size: int, *, is_archive: bool, is_remote: bool) -> tuple[int, int]:
     unpacked = size * 8 if is_archive else size
     copied = (size if is_remote else 0) + (unpacked if is_archive else 0)
     return 1_200 * _MEGABYTE + unpacked * 3 // 2, 100 * _MEGABYTE + copied + 3 * unpacked
+
+
+def is_disk_full(error: Exception) -> bool:
+    """Tell whether an error, also one of DuckDB or pyarrow, says that a disk is full."""
+    return getattr(error, "errno", None) in _FULL or bool(_FULL_WORDS.search(str(error)))
 
 
 def without_secrets(text: str) -> str:

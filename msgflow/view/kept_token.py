@@ -19,7 +19,7 @@ _TOKEN = re.compile(rb"[\w-]{32}")
 
 
 def kept_token(place: str) -> str:
-    """Return the token of a database or lake: the kept one, or a new one that is kept from now on.
+    """Return the token of a database: the kept one, or a new one that is kept from now on.
 
     It is kept in a file that its user alone can read. A file that others can read or have written
     is replaced. Where nothing can be kept, each call returns another token.

@@ -59,7 +59,6 @@ _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:;"
     " connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-_POLICY_OF_FILES = "frame-ancestors 'none'"
 # Status and code of an error, the first kind that it is of.
 _FAILURES = {
     ReplacedError: (409, "replaced"),
@@ -157,21 +156,6 @@ def application(
     return guarded(app, token)
 
 
-def single_application(make: Callable[[], str], token: str) -> ASGIApp:
-    """Return the application of one page with its data inside, made again at each load."""
-
-    async def page(request: Request) -> Response:
-        try:
-            content = await anyio.to_thread.run_sync(make)
-        except MsgflowError as error:
-            hint = f"\n\nhint: {error.hint}" if error.hint else ""
-            return PlainTextResponse(f"error: {error.message}{hint}\n", status_code=500)
-        return Response(content, media_type="text/html")
-
-    # Its data are in the page, which no cookie opens.
-    return guarded(Starlette(routes=[Route("/", page)]), token, _POLICY_OF_FILES, has_cookie=False)
-
-
 async def _answered(
     request: Request, limiter: anyio.CapacityLimiter, ask: Callable[[Started], bytes]
 ) -> Response:
@@ -220,14 +204,14 @@ def _head() -> str:
     return f'{sheets}{scripts}<script type="module" src="{assets.ENTRY}"></script>'
 
 
-def guarded(app: ASGIApp, token: str, policy: str = _POLICY, *, has_cookie: bool = True) -> ASGIApp:
+def guarded(app: ASGIApp, token: str) -> ASGIApp:
     """Return the application for requests with the token, from our own page, to this machine."""
 
     async def answer(scope: Scope, receive: Receive, send: Send) -> None:
         request = Request(scope, receive)
-        refused = _refusal(request, token, has_cookie=has_cookie)
-        headers = _HEADERS if refused else _HEADERS | {"Content-Security-Policy": policy}
-        if has_cookie and not refused and "token" in request.query_params:
+        refused = _refusal(request, token)
+        headers = _HEADERS
+        if not refused and "token" in request.query_params:
             cookie = f"{_cookie_name(request)}={cookie_of(token)}"
             headers = headers | {"Set-Cookie": f"{cookie}; HttpOnly; Path=/; SameSite=strict"}
 
@@ -242,7 +226,7 @@ def guarded(app: ASGIApp, token: str, policy: str = _POLICY, *, has_cookie: bool
     return answer
 
 
-def _refusal(request: Request, token: str, *, has_cookie: bool) -> tuple[int, str] | None:
+def _refusal(request: Request, token: str) -> tuple[int, str] | None:
     """Return the status and the words with which a request is refused."""
     if not is_local(request.headers.get("host", "")):
         return 421, _NOT_HERE
@@ -259,7 +243,7 @@ def _refusal(request: Request, token: str, *, has_cookie: bool) -> tuple[int, st
         is_known = _same(request.query_params["token"], token)
     else:
         cookie = request.cookies.get(_cookie_name(request), "")
-        is_known = has_cookie and _same(cookie, cookie_of(token))
+        is_known = _same(cookie, cookie_of(token))
     if is_known:
         return None
     return 403, "this page needs the address that msgflow ui printed, with its token"

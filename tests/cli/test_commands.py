@@ -34,7 +34,7 @@ COMMANDS = (
     "db upgrade",
     "db schema",
     "fleet ingest",
-    "fleet pack",
+    "fleet remove",
 )
 
 

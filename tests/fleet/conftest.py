@@ -46,9 +46,7 @@ def written(
         for database in databases:
             with Database(database) as opened:
                 folder = path.parent
-                parts.append(
-                    write_part(opened.connection, database, lake.store, folder, views=True)
-                )
+                parts.append(write_part(opened.connection, database, lake.store, folder))
         (path.parent / "parts").write_bytes(pickle.dumps(parts))
 
     folder = made_once(tmp_path_factory, "written", make).parent
@@ -62,7 +60,7 @@ def night(
 ) -> Lake:
     """A lake of three runs, not to be changed: both databases, and the first once more.
 
-    The copy has a key of its own, and takes twice as long for its flows; it has no views.
+    The copy has a key of its own, and takes twice as long for its flows; it has no database.
     """
     place, *parts = written
     lake = Lake.open(shutil.copytree(place, tmp_path_factory.mktemp("night") / "lake"))

@@ -9,17 +9,14 @@ import itertools
 import json
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-import pyarrow as pa
 import pytest
-from thorough import few
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app
-from msgflow.errors import DatabaseError, UsageError
+from msgflow.errors import UsageError
 from msgflow.fleet import ingest as fleet_ingest_module
 from msgflow.fleet import task as task_module
 from msgflow.fleet import workers
@@ -27,7 +24,6 @@ from msgflow.fleet.file_store import Store, normal_url
 from msgflow.fleet.ingest import FleetProgress, fleet_ingest, is_in_shard
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.layout import new_part
-from msgflow.fleet.pack import pack
 from msgflow.fleet.sources import look_at
 from msgflow.fleet.task import Options, Outcome, Task
 
@@ -77,7 +73,7 @@ def ingest(
     labels: dict[str, str] | None = None,
     progress: Callable[[FleetProgress], None] | None = None,
 ) -> FleetProgress:
-    options = Options(views=False, database=False, replace=replace)
+    options = Options(database=False, replace=replace)
     return fleet_ingest(sources, "lake", options=options, labels=labels, progress=progress)
 
 
@@ -195,8 +191,8 @@ def test_what_is_in_the_lake_did_not_fail(place: Path) -> None:
 
 def test_what_cannot_be_looked_at_ends_nothing(place: Path) -> None:
     record("a", "first")
-    Path("night.jsonl").write_text('{"path": "x\\u0000y"}\n{"path": "a"}\n')
-    done = ingest("night.jsonl")
+    Path("night.csv").write_text("path\nx\0y\na\n")
+    done = ingest("night.csv")
     assert (done.added, done.failed) == (1, 1)
     assert set(failures().values()) == {"broken"}
 
@@ -238,27 +234,13 @@ def test_what_others_write_is_read_once(place: Path, monkeypatch: pytest.MonkeyP
     assert len(runs()) == 10
 
 
-def test_packing_keeps_what_counts(place: Path) -> None:
-    ingest(record("a", "first"), record("b", "second"), labels={"robot": "A"})
-    pack(Lake.open("lake"))
-    assert ingest("a", "b", labels={"robot": "B"}).there == 2
-    assert labels_of("first") == {"robot": "B"}
-    pack(Lake.open("lake"))
-    # A source with other packets, and one with those of a run that is packed.
-    record("a", "third")
-    record("c", "second")
-    done = ingest("a", "c")
-    assert (done.replaced, done.same) == (1, 1)
-    assert runs() == {"second": "b", "third": "a"}
-
-
 def test_of_two_runs_of_a_source_the_earlier_one_goes(
     place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A writer was killed when the new run was there and the earlier one not yet removed."""
     ingest(record("a", "first"))
 
-    def killed(self: Lake, keys: object, of: str) -> int:
+    def killed(self: Lake, keys: object) -> int:
         raise KeyboardInterrupt
 
     record("a", "second")
@@ -271,25 +253,31 @@ def test_of_two_runs_of_a_source_the_earlier_one_goes(
     assert runs() == {"second": "a"}
 
 
-def test_a_pack_is_refused_while_others_write(place: Path) -> None:
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_of_two_shards_with_the_same_packets_one_has_the_run(
+    place: Path, monkeypatch: pytest.MonkeyPatch, order: tuple[int, int]
+) -> None:
+    monkeypatch.setattr(
+        fleet_ingest_module, "is_in_shard", lambda source, n, _: source.endswith("az"[n])
+    )
     record("a", "first")
-    refused: list[DatabaseError] = []
+    record("z", "first")
+    Path("night.csv").write_text("path,robot\na,A\nz,Z\n")
+    first, second = ("az"[n] for n in order)
+    # A restart changes nothing, of whichever shard.
+    for shard in (*order, *order, *reversed(order)):
+        fleet_ingest(["night.csv"], "lake", options=Options(database=False), shard=(shard, 2))
+    assert runs() == {"first": first}
+    assert labels_of("first") == {"robot": first.upper()}
+    assert failures() == {second: "same_packets"}
 
-    def try_it(progress: FleetProgress) -> None:
-        with pytest.raises(DatabaseError, match="another msgflow writes to the lake") as raised:
-            pack(Lake.open("lake"))
-        refused.append(raised.value)
-        # Others may write.
-        ingest(record("b", "second"))
 
-    ingest("a", progress=lambda progress: None if refused else try_it(progress))
-    assert refused
-    assert runs() == {"first": "a", "second": "b"}
-    lake = Lake.open("lake")
-    with lake.writing(alone=True):
-        given = ["fleet", "ingest", "a", "--lake", "lake"]
-        assert CliRunner().invoke(app, given).exit_code == 4
-    assert pack(lake).runs == 2
+def test_the_run_of_a_source_that_is_gone_is_that_of_its_copy(place: Path) -> None:
+    ingest(record("a", "first"), labels={"robot": "A"})
+    shutil.move("a", "b")
+    assert ingest("b").replaced == 1
+    assert (runs(), labels_of("first")) == ({"first": "b"}, {"robot": "A"})
+    assert ingest("b").there == 1
 
 
 def test_scratch_space_that_cannot_be_made_is_not_full(place: Path) -> None:
@@ -304,25 +292,10 @@ def test_a_run_is_removed_once(place: Path) -> None:
     given = ["fleet", "remove", "first", "first", "--lake", "lake"]
     result = CliRunner().invoke(app, given)
     assert result.exit_code == 0
-    assert "1 run removed" in result.stderr
+    assert "1 run and 0 files of 0.0 MB removed" in result.stderr
     assert runs() == {"second": "b"}
     with pytest.raises(UsageError, match=r"(?s)no such run — first.*--lake .*lake"):
         Lake.open("lake").remove(["first"])
-
-
-def shards(*sources: str, order: Sequence[int]) -> None:
-    """Ingest by shards, one after the other."""
-    for shard in order:
-        options = Options(database=False)
-        fleet_ingest(sources, "lake", options=options, shard=(shard, len(order)))
-
-
-def table(rows: pa.Table) -> list[dict[str, Any]]:
-    """Return rows without what differs from time to time."""
-    left = {"part", "committed_ns", "failed_ns", "worker", "seconds", "tries"}
-    return [
-        {name: value for name, value in row.items() if name not in left} for row in rows.to_pylist()
-    ]
 
 
 def test_shards_do_each_recording_once(place: Path) -> None:
@@ -346,37 +319,6 @@ def test_shards_do_each_recording_once(place: Path) -> None:
     for text in ("3/3", "1", "-1/3", "a/b", "0/0"):
         wrong = CliRunner().invoke(app, [*given[:-1], text])
         assert (wrong.exit_code, "--shard takes I/N" in wrong.stderr) == (2, True)
-
-
-@pytest.mark.parametrize(
-    "labels", few([{"a": "A", "b": "B"}, {"a": "A", "b": "A"}, {"b": "B"}, {}], {"b": "B"})
-)
-def test_no_order_of_shards_matters(place: Path, labels: dict[str, str]) -> None:
-    """Two have the same packets, in different shards: the first of the command becomes the run."""
-    record("a", "first")
-    other = next(
-        name
-        for name in map("b{}".format, itertools.count())
-        if is_in_shard(f"{place}/{name}", 0, 2) != is_in_shard(f"{place}/a", 0, 2)
-    )
-    record(other, "first")
-    robots = f"path,robot\na,{labels.get('a', '')}\n{other},{labels.get('b', '')}\n"
-    Path("night.csv").write_text(robots)
-    found = []
-    for order in ((), (0, 1), (1, 0)):
-        shutil.rmtree("lake", ignore_errors=True)
-        if order:
-            shards("night.csv", order=order)
-        else:
-            ingest("night.csv")
-        lake = Lake.open("lake")
-        found.append((table(lake.runs()), table(lake.failures())))
-        assert runs() == {"first": "a"}
-    assert found[0] == found[1] == found[2]
-    # A restart changes nothing, of whichever shard.
-    for order in ((0, 1), (1, 0)):
-        shards("night.csv", order=order)
-        assert (table(lake.runs()), table(lake.failures())) == found[0]
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])

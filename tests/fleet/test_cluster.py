@@ -117,7 +117,6 @@ def test_much_goes_wrong(
                 database,
                 other.store,
                 tmp_path,
-                views=False,
                 database=False,
             )["part"]
         for table in ("flow", "callbacks", "topics_delivery", "distribution", "finding"):

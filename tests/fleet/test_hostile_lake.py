@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import json
 import os
 import re
 import shutil
@@ -18,16 +16,14 @@ import pytest
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app
-from msgflow.errors import DatabaseError, UsageError
+from msgflow.errors import DatabaseError, QueryError, UsageError
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.lake_query import fleet_sql
-from msgflow.fleet.layout import RUN_SCHEMA, database_path, new_part, part_path
-from msgflow.fleet.pack import pack
+from msgflow.fleet.layout import RUN_SCHEMA, database_path
 from msgflow.fleet.run_database import open_run
 from msgflow.fleet.sources import read_manifest
 from msgflow.trace import extraction
-from msgflow.version import __version__
 from msgflow_sim import simulate
 
 LARGEST = 2**63 - 1
@@ -47,12 +43,6 @@ def put_row(lake: Lake, **values: Any) -> str:
     return lake.store.url_of("run/feed.parquet")
 
 
-def parquet(**columns: list[Any]) -> bytes:
-    sink = io.BytesIO()
-    pyarrow.parquet.write_table(pa.table(columns), sink)
-    return sink.getvalue()
-
-
 @pytest.mark.parametrize("ray", [None, pytest.param("local", marks=pytest.mark.thorough)])
 def test_no_module_of_the_current_folder_is_imported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ray: str | None
@@ -66,46 +56,23 @@ def test_no_module_of_the_current_folder_is_imported(
     if ray is not None:
         pytest.importorskip("ray", reason="ray is not installed")
     given = ["fleet", "ingest", "r0", "--lake", str(tmp_path / "lake"), "--events", "my_pkg:*"]
-    done = CliRunner().invoke(
-        app, [*given, "--views", "--no-database", *([] if ray is None else ["--ray", ray])]
-    )
+    done = CliRunner().invoke(app, [*given, *([] if ray is None else ["--ray", ray])])
     assert done.exit_code == 0, done.stderr
     assert not (tmp_path / "run").exists()
     found = fleet_sql(Lake.open(tmp_path / "lake"), "SELECT DISTINCT name FROM view.user_event")
     assert found.table["name"].to_pylist() == ["my_pkg:frame_done"]
 
 
-@pytest.mark.thorough
-def test_packing_deletes_nothing_behind_a_link(lake: Lake, tmp_path: Path) -> None:
-    part = new_part("f" * 20)
-    victim, root = tmp_path / "victim", Path(lake.store.url)
-    victim.mkdir()
-    kept = [victim / f"{part}.parquet", victim / "precious", root / "flow" / "notes.parquet"]
-    unused = [root / "flow" / f"{part}.parquet", root / "view" / "topic" / f"{part}.parquet"]
-    left = [root / "flow" / f".{part}.parquet.x.part", root / "run" / ".feed.parquet.x.part"]
-    for file in (*kept, *unused, *left):
-        file.write_text("x")
-    (root / "flow" / "more").symlink_to(victim)
-    (root / "view" / "more").symlink_to(victim)
-    linked = root / "callbacks" / f"{part}.parquet"
-    linked.symlink_to(victim / "precious")
-    pack(lake)
-    assert all(file.exists() for file in kept)
-    assert not any(file.exists() for file in (*unused, *left))
-    assert (root / "flow" / "more").is_symlink()
-    assert linked.is_symlink()
-
-
 @pytest.mark.parametrize("kind", ["folder", "pipe"])
 def test_what_is_no_file_among_the_runs_is_an_error(lake: Lake, kind: str) -> None:
-    """It would look like a run that is gone, and `pack` would delete what belongs to it."""
+    """It would look like a run that is gone, and what belongs to it would be deleted."""
     place = Path(lake.store.url) / "run" / "stranger.parquet"
     if kind == "folder":
         place.mkdir()
     else:
         os.mkfifo(place)
     with pytest.raises(DatabaseError, match=r"no file — .*run/stranger\.parquet"):
-        pack(lake)
+        lake.clean_up()
 
 
 def test_files_behind_links_are_errors(lake: Lake, tmp_path: Path) -> None:
@@ -137,12 +104,6 @@ def test_a_part_cannot_lead_out_of_the_lake(lake: Lake) -> None:
         lake.runs()
 
 
-def test_a_run_cannot_lead_out_of_the_lake(lake: Lake) -> None:
-    lake.pack_runs([{"run": "../victim", "committed_ns": 1}])
-    with pytest.raises(DatabaseError, match="a run that is no name"):
-        lake.remove(["../victim"])
-
-
 def test_a_run_is_in_its_own_file(lake: Lake) -> None:
     """A copy of it under another name could not be replaced or removed."""
     file = Path(lake.store.url) / "run" / f"{lake.runs()['run'][0]}.parquet"
@@ -151,49 +112,19 @@ def test_a_run_is_in_its_own_file(lake: Lake) -> None:
         lake.runs()
 
 
-@pytest.mark.parametrize("column", ["run", "committed_ns"])
-def test_a_row_without_what_counts_names_its_file(lake: Lake, column: str) -> None:
-    url = put_row(lake, **{column: None})
-    with pytest.raises(DatabaseError, match=f"a row without {column} — {url}"):
-        lake.runs()
-
-
 @pytest.mark.parametrize(
     "values",
     [
         {"part": None},
         {"part": "p", "committed_ns": LARGEST},
-        {"part": "pack-0000000000-1", "view_part": None},
+        {"committed_ns": None},
     ],
 )
 def test_a_strange_run_can_be_removed(lake: Lake, values: dict[str, Any]) -> None:
     put_row(lake, **values)
     assert "feed" in lake.runs()["run"].to_pylist()
-    assert lake.remove(["feed"]) == 1
-    assert "feed" not in Lake.open(lake.store.url).runs()["run"].to_pylist()
-    pack(lake)
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"no parquet",
-        parquet(x=[1]),
-        parquet(run=["feed"], part=[{"a": 1}], latency_ns=[["text"]], path=[{"b": 2}]),
-        parquet(run=[1]),
-    ],
-)
-def test_a_file_that_is_none_of_ours_is_named(lake: Lake, content: bytes) -> None:
-    revision = lake.runs()["schema_revision"][0].as_py()
-    put_row(lake, part="strange", msgflow_version=__version__, schema_revision=revision)
-    path = part_path("flow", "strange")
-    lake.store.put(path, content)
-    with pytest.raises(DatabaseError, match="cannot be used") as raised:
-        pack(lake)
-    assert lake.store.url_of(path) in raised.value.message
-    assert "fleet remove feed " in (raised.value.hint or "")
-    lake.remove(["feed"])
-    pack(lake)
+    lake.clean_up(lake.remove(["feed"]))
+    assert len(Lake.open(lake.store.url).runs()) == 3
 
 
 DEEP = "[" * 200_000
@@ -203,22 +134,6 @@ def test_deep_json_is_no_lake(tmp_path: Path) -> None:
     (tmp_path / "lake.json").write_text(DEEP)
     with pytest.raises(DatabaseError, match="not that of a lake"):
         Lake.open(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "words"),
-    [
-        ("m.jsonl", DEEP, "cannot read the manifest"),
-        ("m.jsonl", json.dumps({"path": "r0", "robot": "\ud800"}), "half of a character"),
-        ("m.jsonl", json.dumps({"path": "\udfff"}), "half of a character"),
-        ("m.jsonl", json.dumps({"path": "r0", "x": {}}), "a label is a text or a number"),
-        ("m.parquet", "PAR1", "is it Parquet"),
-    ],
-)
-def test_manifests_that_are_none(tmp_path: Path, name: str, text: str, words: str) -> None:
-    (tmp_path / name).write_text(text)
-    with pytest.raises(UsageError, match=words):
-        read_manifest(str(tmp_path / name))
 
 
 @pytest.mark.parametrize("place", ["m.csv", "lake.json"])
@@ -286,30 +201,15 @@ def test_passwords_in_endpoints_are_not_printed(url: str, monkeypatch: pytest.Mo
     assert "ss@" not in str(raised.value)
 
 
-@pytest.mark.parametrize("is_linked", [True, False])
-def test_packing_loses_no_answers_that_are_elsewhere(lake: Lake, is_linked: bool) -> None:
-    row = lake.runs().to_pylist()[0]
-    file = Path(lake.store.url) / part_path("flow", row["part"])
-    moved = file.replace(file.parents[2] / "moved.parquet")
-    if is_linked:
-        file.symlink_to(moved)
-    with pytest.raises(DatabaseError, match=rf"(missing|symbolic link).* — {file}"):
-        pack(lake)
-    file.unlink(missing_ok=True)
-    moved.rename(file)
-    pack(lake)
-    assert len(lake.runs()) == 3
-
-
 @pytest.mark.parametrize("is_folder", [True, False])
-def test_packing_loses_no_runs_that_are_elsewhere(lake: Lake, is_folder: bool) -> None:
+def test_no_runs_that_are_elsewhere_are_lost(lake: Lake, is_folder: bool) -> None:
     root = Path(lake.store.url)
-    key = lake.names()[0]
+    key = lake.keys()[0]
     link = root / "run" if is_folder else root / "run" / f"{key}.parquet"
     moved = link.replace(root.parent / "moved.parquet")
     link.symlink_to(moved)
     files = {path for path in root.rglob("*") if path.is_file()}
-    for use in (lambda: pack(lake), lake.runs, lambda: lake.remove([key])):
+    for use in (lake.clean_up, lake.runs, lambda: lake.remove([key])):
         with pytest.raises(DatabaseError, match=rf"no symbolic link below a lake — {link}"):
             use()
     assert {path for path in root.rglob("*") if path.is_file()} == files
@@ -327,13 +227,11 @@ def test_commands_are_quoted(lake: Lake) -> None:
 def test_names_of_views_are_neither_paths_nor_sql(
     lake: Lake, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Those of a database in the lake, and those of its folders."""
+    """Those of a database in the lake."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     (tmp_path / "temporary").mkdir()
-    row, part, *_ = (each for each in lake.runs().to_pylist() if each["database_part"] is not None)
-    # Its views are read from its database.
-    lake.commit([{**row, "view_part": None}])
+    row = next(each for each in lake.runs().to_pylist() if each["database_part"] is not None)
     packed = Path(lake.store.url, database_path(row["database_part"]))
     database = tmp_path / "run.duckdb"
     with pa.input_stream(packed, compression="zstd") as stream:
@@ -342,17 +240,10 @@ def test_names_of_views_are_neither_paths_nor_sql(
         connection.execute('CREATE VIEW main."../../../victim" AS SELECT 1 AS x')
     with pa.output_stream(packed, compression="zstd") as sink:
         sink.write(database.read_bytes())
-    name = "a'), union_by_name = true)) TO 'b.csv'; --"
-    folder = Path(lake.store.url, "view", name)
-    folder.mkdir(parents=True)
-    (folder / f"{part['view_part']}.parquet").write_bytes(
-        parquet(run=[part["run"]], part=[part["view_part"]], x=[1])
-    )
     before = {path for path in tmp_path.rglob("*") if "temporary" not in path.parts}
-    found = fleet_sql(lake, "SELECT view_name FROM duckdb_views() WHERE schema_name = 'view'")
-    names = found.table["view_name"].to_pylist()
-    assert "publication" in names
-    assert name in names
-    assert "../../../victim" not in names
+    given = {"where": f"run = '{row['run']}'"}
+    assert len(fleet_sql(lake, "FROM view.publication", **given))
+    with pytest.raises(QueryError):
+        fleet_sql(lake, 'FROM view."../../../victim"', **given)
     assert {path for path in tmp_path.rglob("*") if "temporary" not in path.parts} == before
     assert not any((tmp_path / "temporary").iterdir())

@@ -16,21 +16,17 @@ import pytest
 from lakes import content, copied, paths, read, rows_of
 
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.layout import PACKED, VIEWS, part_of, run_path
-from msgflow.fleet.pack import pack
 from msgflow.fleet.part import ANSWERS
 
 Row = dict[str, Any]
 _TABLES = len(ANSWERS)
-# Ends the process by SIGKILL after so many files were written or deleted. The last one written is
-# there under its temporary name.
+# Ends the process by SIGKILL after so many files were written. The last one is there under its
+# temporary name.
 _DIES = """
 import os, signal, sys
 from pathlib import Path
 from msgflow import Database
-from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.pack import pack
 from msgflow.fleet.part import write_part
 
 lake, left = Lake.open(sys.argv[1]), int(sys.argv[2])
@@ -44,9 +40,8 @@ def dying(work):
         return work(*given)
     return step
 
-os.fsync, Store.delete = dying(os.fsync), dying(Store.delete)
+os.fsync = dying(os.fsync)
 """
-_PACKS = "pack(lake)"
 _WRITES = """
 database, scratch = map(Path, sys.argv[3:])
 with Database(database) as opened:
@@ -78,48 +73,6 @@ def dies(program: str, lake: Lake, steps: int, *more: Path) -> None:
     assert done.returncode == -signal.SIGKILL, done.stderr
 
 
-@pytest.mark.parametrize(
-    "steps",
-    [
-        pytest.param(-70, marks=pytest.mark.thorough),
-        # The rows of the pack are not there yet.
-        pytest.param(0, marks=pytest.mark.thorough),
-        # Both the rows of the pack and files of runs are there.
-        2,
-        pytest.param(10, marks=pytest.mark.thorough),
-    ],
-)
-def test_a_pack_that_is_killed_changes_no_answer(
-    holding: tuple[Lake, Row, Row], steps: int
-) -> None:
-    """It is killed some steps after it has written all answers and views."""
-    lake, *_ = holding
-    before, files = content(lake), paths(lake, "")
-    dies(_PACKS, lake, _TABLES + len(lake.store.folders(VIEWS)) + steps)
-    assert paths(lake, "") != files
-    assert content(lake) == before
-    pack(lake)
-    assert content(lake) == before
-    (part,) = set(lake.runs()["part"].to_pylist())
-    assert paths(lake, "run") == {run_path(PACKED)}
-    tables = paths(lake, *ANSWERS)
-    assert {part_of(path) for path in tables} == {part}
-    assert len(paths(lake, VIEWS)) == len(lake.store.folders(VIEWS))
-
-
-def test_a_pack_that_is_killed_after_the_last_run_was_removed_can_be_repeated(
-    holding: tuple[Lake, Row, Row],
-) -> None:
-    lake, *rows = holding
-    lake.remove([row["run"] for row in rows])
-    before = paths(lake, "")
-    dies(_PACKS, lake, 1)
-    assert len(before - paths(lake, "")) == 1
-    assert pack(lake).deleted
-    assert paths(lake, *ANSWERS, "run") == set()
-
-
-@pytest.mark.thorough
 @pytest.mark.parametrize("steps", [pytest.param(5, marks=pytest.mark.thorough), _TABLES])
 def test_a_replacement_that_is_killed_leaves_the_old_run(
     holding: tuple[Lake, Row, Row], databases: tuple[Path, Path], tmp_path: Path, steps: int
@@ -131,9 +84,6 @@ def test_a_replacement_that_is_killed_leaves_the_old_run(
     assert len(left) == steps + 1
     assert content(lake) == before
     assert lake.runs().equals(runs)
-    pack(lake)
-    assert content(lake) == before
-    assert not left & paths(lake, "")
 
 
 @pytest.mark.thorough
@@ -168,6 +118,3 @@ def test_of_two_writers_one_counts_whole(holding: tuple[Lake, Row, Row]) -> None
             writer.wait()
     assert seen == set(rows)
     assert rows_of(lake, "flow") == flows[lake.runs()["part"][0].as_py()]
-    pack(lake)
-    assert rows_of(lake, "flow") in flows.values()
-    assert paths(lake, "run") == {run_path(PACKED)}

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import time
 from pathlib import Path
 from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
-from lakes import EXAMPLE, PAGE, content, copied, paths, read, rows_of
+from lakes import EXAMPLE, PAGE, content, paths, read, rows_of
+from typer.testing import CliRunner
 
 from msgflow import Database
+from msgflow.cli.app import app
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.file_store import Store
 from msgflow.fleet.lake import Lake
-from msgflow.fleet.layout import (
-    PACKED,
-    RUN,
-    RUN_SCHEMA,
-    VIEWS,
-    part_of,
-    part_path,
-    run_path,
-    view_path,
-)
-from msgflow.fleet.pack import pack
+from msgflow.fleet.lake_query import fleet_sql
+from msgflow.fleet.layout import RUN_SCHEMA, part_path, run_path
 from msgflow.fleet.part import ANSWERS, write_part
 
 Row = dict[str, Any]
@@ -72,16 +67,6 @@ def test_answers_are_those_of_the_database(
             found = [values[1:] for values in rows_of(lake, name.replace("-", "_"))]
             assert found == sorted(map(tuple, (r.values() for r in expected.to_pylist())))
         flows = database.query("flows").to_arrow()
-        for view in ("publication", "link_transport", "topic"):
-            expected_rows = database.sql(
-                f"SELECT * EXCLUDE run_id FROM {view} ORDER BY ALL", limit=None
-            ).to_arrow()
-            found = read(
-                lake,
-                f"SELECT * EXCLUDE (run, part) FROM read_parquet('LAKE/view/{view}/*.parquet') "
-                "JOIN (SELECT run, view_part AS part FROM run) USING (run, part) ORDER BY ALL",
-            )
-            assert found == [tuple(r.values()) for r in expected_rows.to_pylist()]
         p99 = dict(
             database.sql(
                 "SELECT path, quantile_disc(latency_ns, 0.99) FROM end_to_end([1]) "
@@ -102,11 +87,15 @@ def test_runs_add_up(holding: tuple[Lake, Row, Row]) -> None:
     """A quantile of several runs, from counts in buckets, is off by less than 1 %."""
     lake, *parts = holding
     lake.commit(parts)
-    exact = read(
-        lake,
-        "SELECT quantile_disc(end_ns - start_ns, [0.05, 0.5, 0.9, 0.99, 1])"
-        " FROM read_parquet('LAKE/view/callback_instance/*.parquet')",
-    )[0][0]
+    (exact,) = (
+        fleet_sql(
+            lake,
+            "SELECT quantile_disc(end_ns - start_ns, [0.05, 0.5, 0.9, 0.99, 1]) AS exact"
+            " FROM view.callback_instance",
+        )
+        .table["exact"]
+        .to_pylist()
+    )
     counted = read(
         lake,
         "WITH b AS (SELECT bucket, sum(count) AS count FROM"
@@ -128,7 +117,7 @@ def test_writing_again_leaves_what_is_there(
     before = {entry.path: lake.store.read(entry.path) for entry in lake.store.entries()}
     again = write(lake, databases[0], tmp_path)
     assert first["part"] != again["part"]
-    names = {"part", "view_part", "database_part"}
+    names = {"part", "database_part"}
     assert {**first, **dict.fromkeys(names)} == {**again, **dict.fromkeys(names)}
     for table in ANSWERS:
         one, other = (
@@ -161,7 +150,7 @@ def test_the_last_row_of_a_run_counts(
     assert {values[0] for values in rows_of(lake, "flow")} == {other["run"]}
     with pytest.raises(UsageError, match="no such run"):
         lake.remove([other["run"], first["run"]])
-    for key in ("\0", f"../run/{other['run']}", PACKED):
+    for key in ("\0", f"../run/{other['run']}"):
         with pytest.raises(UsageError, match="no such run"):
             lake.remove([key])
     assert len(lake.runs()) == 1
@@ -171,11 +160,10 @@ def test_files_say_what_they_are(holding: tuple[Lake, Row, Row]) -> None:
     lake, part, _ = holding
     lake.commit([part])
     flow = part_path("flow", part["part"])
-    view = view_path("node", part["view_part"])
-    for path, table in ((flow, "flow"), (run_path(part["run"]), "run"), (view, "node")):
+    for path, table in ((flow, "flow"), (run_path(part["run"]), "run")):
         meta = pq.read_schema(lake.store.full(path)).metadata
         assert meta[b"msgflow.table"] == table.encode()
-        assert meta[b"msgflow.lake_revision"] == b"2"
+        assert meta[b"msgflow.lake_revision"] == b"3"
         assert meta[b"msgflow.schema_revision"] == part["schema_revision"].encode()
         assert b"msgflow.version" in meta
 
@@ -196,8 +184,8 @@ def test_what_is_no_lake_is_refused(tmp_path: Path) -> None:
         Lake.open(tmp_path, create=True)
     assert sorted(tmp_path.iterdir()) == [tmp_path / "file"]
     for text, words in (
-        ('{"format": "msgflow lake", "revision": 99}', "newer than this msgflow knows"),
-        ('{"format": "msgflow lake", "revision": 1}', r"(?s)older than .*ingest .* a new lake"),
+        ('{"format": "msgflow lake", "revision": 4}', "newer than this msgflow knows"),
+        ('{"format": "msgflow lake", "revision": 2}', r"(?s)older than .*ingest .* a new lake"),
         ('{"format": "another"}', "not that of a lake"),
         ("[]", "not that of a lake"),
     ):
@@ -251,100 +239,54 @@ def test_a_file_appears_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert store.read("a/b") is None
 
 
-def test_packing_changes_no_answer(
+def aged(lake: Lake) -> None:
+    """Let all files be two days old."""
+    for entry in lake.store.entries():
+        os.utime(lake.store.full(entry.path), ns=(0, time.time_ns() - 2 * 86_400 * 10**9))
+
+
+def test_what_no_run_needs_is_deleted(
     holding: tuple[Lake, Row, Row], databases: tuple[Path, Path], tmp_path: Path
 ) -> None:
     lake, first, other = holding
-    copied(lake, first, first["run"])
     lake.commit([first, other])
-    before = content(lake)
-    done = pack(lake)
-    assert (done.runs, done.packs) == (2, 2)
-    assert content(lake) == before
-    assert paths(lake, "run") == {run_path(PACKED)}
-    views = lake.store.folders(VIEWS)
-    for key, tables in (("part", [*ANSWERS]), ("view_part", [VIEWS])):
-        (part,) = set(lake.runs()[key].to_pylist())
-        assert {part_of(path) for path in paths(lake, *tables)} == {part}
-    assert len(paths(lake, VIEWS)) == len(views) > 60
-    assert len(paths(lake, "database")) == 2
-    assert pack(lake).deleted == 0
-    # A replaced run has a file of its own again.
     again = write(lake, databases[0], tmp_path)
     lake.commit([again])
-    answered = slice(1, 1 + len(ANSWERS))
-    assert content(lake)[answered] == before[answered]
-    assert paths(lake, "run") == {run_path(PACKED), run_path(first["run"])}
-    with pytest.raises(UsageError, match="no such run — packed"):
-        lake.remove([PACKED])
-    # Neither row is left after a removal.
-    lake.remove([first["run"]])
-    assert lake.run(first["run"]) is None
-    assert first["run"] not in lake.runs()["run"].to_pylist()
-    assert read(lake, "SELECT run FROM run") == [(other["run"],)]
-    assert {row[0] for row in rows_of(lake, "flow")} == {other["run"]}
-    # The pack still has its answers and views.
-    done = pack(lake)
-    assert (done.runs, done.packs) == (1, 2)
-    for table in ("flow", f"{VIEWS}/node"):
-        (file,) = paths(lake, table)
-        kept = pq.ParquetFile(lake.store.full(file)).read()
-        assert set(kept["run"].to_pylist()) == {other["run"]}
-    assert not any(first["run"] in path for path in paths(lake, ""))
-    lake.remove([other["run"]])
-    pack(lake)
-    assert paths(lake, "") == {"lake.json"}
-    assert len(lake.runs()) == 0
+    unfinished = [lake.store.full(f"flow/{'f' * 20}-0123456789.parquet")]
+    unfinished += [lake.store.full("flow/.x.parquet.mark.part")]
+    kept = [lake.store.full(name) for name in ("flow/notes.txt", "lake.json")]
+    for file in (*unfinished, kept[0]):
+        shutil.copy(lake.store.full(part_path("flow", first["part"])), file)
+    before, files = content(lake), paths(lake, "")
+    # Another process may be about to commit what is new.
+    assert lake.clean_up() == (0, 0)
+    assert paths(lake, "") == files
+    aged(lake)
+    number, size = lake.clean_up()
+    assert number == len(ANSWERS) + 1 + len(unfinished)
+    assert size > 10_000
+    assert content(lake) == before
+    assert not any(first["part"] in path for path in paths(lake, ""))
+    assert all(map(os.path.exists, kept))
+    # Those of a run that is removed go at once.
+    given = ["fleet", "remove", other["run"], "--lake", lake.store.url]
+    said = CliRunner().invoke(app, given).stderr
+    assert f"1 run and {len(ANSWERS) + 1} files of " in said
+    assert rows_of(lake, "flow")
+    assert not any(other["run"] in path for path in paths(lake, ""))
+    lake.clean_up(lake.remove([again["run"]]))
+    assert paths(lake, "") == {"lake.json", "flow/notes.txt"}
 
 
-@pytest.mark.parametrize("is_packed", [False, True])
-def test_packing_deletes_no_answers_of_runs_that_are_out_of_sight(
-    holding: tuple[Lake, Row, Row], tmp_path: Path, is_packed: bool
+def test_no_answers_are_deleted_where_runs_are_out_of_sight(
+    holding: tuple[Lake, Row, Row], tmp_path: Path
 ) -> None:
     """The file system with the folder `run` may not be mounted."""
-    lake, first, other = holding
-    lake.commit([first, other])
-    if is_packed:
-        pack(lake)
-    folder = Path(lake.store.full(RUN))
-    files, before = paths(lake, ""), content(lake)
-    folder.rename(tmp_path / "run")
-    folder.mkdir()
-    with pytest.raises(DatabaseError, match=f"the lake has answers, but no run — .*/{RUN}"):
-        pack(lake)
-    folder.rmdir()
-    (tmp_path / "run").rename(folder)
+    lake, *rows = holding
+    lake.commit(rows)
+    aged(lake)
+    Path(lake.store.full("run")).rename(tmp_path / "run")
+    files = paths(lake, "")
+    with pytest.raises(DatabaseError, match=r"the lake has no run — .*/run"):
+        lake.clean_up()
     assert paths(lake, "") == files
-    assert content(lake) == before
-    # A lake that has lost its last run by a removal says so.
-    lake.remove([first["run"], other["run"]])
-    assert paths(lake, RUN) == {run_path(PACKED)}
-    pack(lake)
-    assert paths(lake, "") == {"lake.json"}
-
-
-@pytest.mark.thorough
-def test_packs_are_of_one_version_and_not_too_large(
-    holding: tuple[Lake, Row, Row], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    lake, first, other = holding
-    keys = [f"{number:020x}" for number in range(5)]
-    for number, key in enumerate(keys):
-        lake.commit([{**copied(lake, first, key), "start_ns": number}])
-    lake.commit([{**other, "msgflow_version": "0.0.1"}])
-    before = content(lake)
-    monkeypatch.setattr("msgflow.fleet.pack._MOST_RUNS", 2)
-    done = pack(lake)
-    assert (done.runs, done.packs) == (4, 2)
-    parts = {run["run"]: run["part"] for run in lake.runs().to_pylist()}
-    assert parts[keys[0]] == parts[keys[1]] != parts[keys[2]] == parts[keys[3]]
-    assert parts[keys[4]].startswith(keys[4])
-    assert parts[other["run"]] == other["part"]
-    assert content(lake) == before
-    # Full packs stay as they are, until one of their runs is gone.
-    assert pack(lake).packs == 0
-    lake.remove([keys[0]])
-    before = content(lake)
-    done = pack(lake)
-    assert (done.runs, done.packs) == (2, 1)
-    assert content(lake) == before

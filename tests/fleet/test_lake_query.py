@@ -29,7 +29,7 @@ from msgflow.fleet.lake_query import (
     lake_names,
     names,
 )
-from msgflow.fleet.part import write_part
+from msgflow.fleet.part import ANSWERS, write_part
 from msgflow.ingest import ingest
 from msgflow.query.catalogue import load_query
 from msgflow.query.selection import make_selection
@@ -47,9 +47,9 @@ def rows(table: pa.Table, columns: list[str]) -> list[tuple[object, ...]]:
 
 
 def test_headers_are_those_of_the_statements(night: Lake) -> None:
-    with Reading(choose(night)) as reading:
+    groups = duckdb.sql("SELECT $key AS run, ['r1'] AS label_group", params={"key": "c" * 20})
+    with Reading(choose(night), ANSWERS, groups=groups.to_arrow_table()) as reading:
         con = reading.connection
-        con.execute("CREATE TABLE run_group AS SELECT run, 1::BIGINT AS label_group FROM run")
         for name in STATEMENTS.names():
             header = STATEMENTS.header(name)
             if not header.columns:
@@ -191,9 +191,7 @@ def test_goals_of_several_runs_are_added_up(tmp_path: Path) -> None:
         simulate("actions", recording, factor=0.2, seed=seed)
         ingest([recording], path)
         with Database(path) as database:
-            part = write_part(
-                database.connection, path, lake.store, tmp_path, views=True, database=False
-            )
+            part = write_part(database.connection, path, lake.store, tmp_path)
             alone += database.query("action-latency").to_arrow().to_pylist()
         commits.append({**part, "labels": {}, "source": str(seed)})
     lake.commit(commits)
@@ -277,9 +275,9 @@ def test_sql_reads_the_chosen_runs_and_nothing_else(night: Lake, tmp_path: Path)
     chosen = fleet_sql(night, "SELECT count(*) AS n FROM run", where="robot = 'r1'")
     assert chosen.table["n"].to_pylist() == [2]
     tables = fleet_sql(night, "SHOW ALL TABLES").table
-    assert {"flow", "publication", "run"} <= set(tables["name"].to_pylist())
+    assert {"flow", "timers", "run"} <= set(tables["name"].to_pylist())
     listed = fleet_sql(night, "SELECT table_name FROM information_schema.tables").table
-    assert {"flow", "publication", "run"} <= set(listed["table_name"].to_pylist())
+    assert {"flow", "timers", "run"} <= set(listed["table_name"].to_pylist())
     capped = fleet_sql(night, "FROM view.topic", limit=1)
     assert (len(capped), len(capped.notes)) == (1, 1)
     target = tmp_path / "x.csv"
@@ -337,14 +335,6 @@ def test_the_worst_flows_come_with_what_opens_them(night: Lake) -> None:
         "worst", path, "--lake", night.store.url, "--where", "name = 'copy'", "--format", "json"
     )
     assert '"name": "copy"' in result.stdout or '"name":"copy"' in result.stdout
-
-
-def test_a_lake_of_an_earlier_version_lacks_tables(night: Lake, tmp_path: Path) -> None:
-    lake = Lake.open(tmp_path / "lake", create=True)
-    row = night.runs().to_pylist()[0]
-    lake.commit([row | {"labels": dict(row["labels"] or ()), "msgflow_version": "0.0.1"}])
-    with pytest.raises(UsageError, match="an earlier msgflow wrote them — topics_delivery"):
-        fleet_query(lake, "topics-delivery")
 
 
 def test_nobody_waits_for_pandas(night: Lake) -> None:

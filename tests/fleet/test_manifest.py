@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from object_store import KEYS, ObjectStore, object_store
 
@@ -39,7 +36,8 @@ def test_labels_are_texts_as_they_stand_there(tmp_path: Path) -> None:
         "\r\n"
         f'{tmp_path}/a,r1,"says ""hi"", twice\nand more",007\r\n'
     )
-    first, second = read_manifest(manifest(tmp_path, text))
+    # Equal rows count once.
+    first, second = find_recordings([manifest(tmp_path, text)])
     assert first.source == str(tmp_path / "a")
     assert first.labels == {
         "robot": "r1",
@@ -48,18 +46,6 @@ def test_labels_are_texts_as_they_stand_there(tmp_path: Path) -> None:
     }
     assert second.source == "s3://bucket/b"
     assert second.labels == {"note": "'quoted'", "version": "1.10"}
-
-
-def test_other_forms_say_the_same(tmp_path: Path) -> None:
-    rows = [{"path": "a", "robot": "r1", "build": 7, "is_new": True}, {"path": "b", "robot": None}]
-    lines = "\n".join(json.dumps(row) for row in rows)
-    pq.write_table(pa.Table.from_pylist(rows), tmp_path / "night.parquet")
-    expected = [
-        (str(tmp_path / "a"), {"robot": "r1", "build": "7", "is_new": "true"}),
-        (str(tmp_path / "b"), {}),
-    ]
-    for source in (manifest(tmp_path, f"{lines}\n\n", "n.jsonl"), str(tmp_path / "night.parquet")):
-        assert [(r.source, r.labels) for r in read_manifest(source)] == expected
 
 
 @pytest.mark.parametrize(
@@ -72,20 +58,15 @@ def test_other_forms_say_the_same(tmp_path: Path) -> None:
         ("n.csv", "path,my robot\na,b\n", "no key of a label — 'my robot', a column of"),
         ("n.csv", "path,robot\na,b\n,c\n", "a row without a path, in line 3"),
         ("n.csv", "path,robot\na,b,c\n", "3 values for 2 columns, in line 2"),
-        ("n.csv", "path,robot\na,b\n./a,c\n", "two things of one recording, in line 2 and line 3"),
+        ("n.csv", "path,robot\na,b\n./a,c\n", "given twice, with different labels — .*/a"),
         ("n.csv", 'path,robot\na,"b\n', "cannot read the manifest: .*in line 2"),
         ("n.csv", b"path\n\xff\n", "not UTF-8"),
-        ("n.jsonl", '{"path": "a"}\n{"path"\n', "cannot read the manifest: .*in line 2"),
-        ("n.jsonl", '["a"]\n', "no object, in line 1"),
-        ("n.jsonl", '{"path": "a", "robot": ["r"]}', "a text or a number — robot"),
-        ("n.jsonl", '{"robot": "a"}', "no column path, its columns are robot"),
-        ("n.parquet", "no parquet", "cannot read the manifest"),
         ("n.csv", f"path,x\na,{'y' * 1001}\n", "no value of a label — x, in line 2"),
     ],
 )
 def test_what_is_no_manifest(tmp_path: Path, name: str, text: str | bytes, words: str) -> None:
     with pytest.raises(UsageError, match=words):
-        read_manifest(manifest(tmp_path, text, name))
+        find_recordings([manifest(tmp_path, text, name)])
 
 
 def test_sources_are_paths_patterns_and_manifests(
@@ -151,8 +132,6 @@ def test_a_store_that_is_not_there(bucket: ObjectStore, monkeypatch: pytest.Monk
     assert not any(secret in str(raised.value) for secret in KEYS.values() if "-1" not in secret)
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
     monkeypatch.setattr("msgflow.fleet.file_store.MOST_ATTEMPTS", 1)
-    # If the service does not answer, only the client of AWS tries again.
-    monkeypatch.setattr("msgflow.fleet.file_store.PAUSES", (1e6,))
     with pytest.raises(DatabaseError, match="cannot read the store"):
         Store("s3://fleet/lake").read("lake.json")
 

@@ -22,9 +22,6 @@ pytestmark = pytest.mark.skipif(shutil.which("java") is None, reason="there is n
 def test_spark_finds_what_duckdb_finds(night: Lake) -> None:
     from pyspark.sql import SparkSession
 
-    # One that no longer counts.
-    (first, *_) = night.runs().to_pylist()
-    night.pack_runs([{**first, "committed_ns": 0, "part": "gone"}])
     spark = (
         SparkSession.builder.master("local[1]")
         .config("spark.ui.enabled", "false")

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from msgflow.fleet.layout import VIEWS, new_part, part_path
+from msgflow.fleet.layout import new_part, part_path
 from msgflow.fleet.part import ANSWERS
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ _ROWS = (
     "SELECT t.* EXCLUDE part FROM read_parquet('LAKE/{table}/*.parquet') AS t "
     "JOIN run USING (run, part) ORDER BY ALL"
 )
-_OF_VIEW = _ROWS.replace("JOIN run", "JOIN (SELECT run, view_part AS part FROM run)")
 
 
 def read(lake: Lake, sql: str) -> list[tuple[Any, ...]]:
@@ -41,11 +40,9 @@ def rows_of(lake: Lake, table: str) -> list[tuple[Any, ...]]:
 
 
 def content(lake: Lake) -> list[list[tuple[Any, ...]]]:
-    """Return all runs, their answers, and the views that are there."""
-    runs = "SELECT * EXCLUDE (part, view_part, committed_ns) FROM run ORDER BY run"
-    tables = [_ROWS.format(table=name) for name in ANSWERS]
-    views = [_OF_VIEW.format(table=f"{VIEWS}/{view}") for view in lake.store.folders(VIEWS)]
-    return _answers(lake, runs, *tables, *views)
+    """Return all runs and their answers."""
+    runs = "SELECT * EXCLUDE (part, committed_ns) FROM run ORDER BY run"
+    return _answers(lake, runs, *(_ROWS.format(table=name) for name in ANSWERS))
 
 
 def _answers(lake: Lake, *statements: str) -> list[list[tuple[Any, ...]]]:
@@ -63,9 +60,9 @@ def copied(lake: Lake, row: dict[str, Any], key: str, slower: int = 1) -> dict[s
     """Write the answers of a run again, as those of another key; commit nothing.
 
     Returns:
-        What `run` is to have: no views and no database.
+        What `run` is to have: no database.
     """
-    copy = {**row, "run": key, "part": new_part(key), "view_part": None, "database_part": None}
+    copy = {**row, "run": key, "part": new_part(key), "database_part": None}
     for answer in ANSWERS:
         table = pq.ParquetFile(lake.store.full(part_path(answer, row["part"]))).read()
         for name in ("run", "part"):

@@ -18,7 +18,7 @@
 --     goals, accepted, rejected, finished, cancelled, server, accept_p99_most_ns, not_answered,
 --     doubtful
 SELECT
-    g.label_group, a.action_name, a.server, a.client,
+    a.label_group, a.action_name, a.server, a.client,
     count(DISTINCT a.run) AS runs,
     sum(COLUMNS([
         'goals', 'accepted', 'rejected', 'not_answered', 'asked', 'finished', 'cancelled',
@@ -33,6 +33,5 @@ SELECT
     max(a.result_max_ns) AS result_max_ns,
     sum(a.loss_affected)::BIGINT AS loss_affected
 FROM action_latency AS a
-JOIN run_group AS g ON a.run = g.run
-GROUP BY g.label_group, a.action_name, a.server, a.client
-ORDER BY a.action_name, a.server, a.client, g.label_group
+GROUP BY a.label_group, a.action_name, a.server, a.client
+ORDER BY a.action_name, a.server, a.client, a.label_group

@@ -4,30 +4,22 @@
 -- grain: one row per group of runs, measure, node and subject
 -- kind: inline
 WITH summed AS (
-    SELECT g.label_group, d.measure, d.node, d.subject, d.bucket, sum(d.count) AS number
-    FROM distribution AS d
-    JOIN run_group AS g ON d.run = g.run
-    GROUP BY g.label_group, d.measure, d.node, d.subject, d.bucket
+    SELECT label_group, measure, node, subject, bucket, sum(count) AS number
+    FROM distribution
+    GROUP BY label_group, measure, node, subject, bucket
 ),
 ranked AS (
     SELECT
-        label_group, measure, node, subject, bucket,
+        label_group, measure, node, subject,
+        round(sign(bucket) * 2 / 2.02 * pow(1.02::DOUBLE, abs(bucket) - 1))::BIGINT AS time_ns,
         sum(number) OVER (PARTITION BY label_group, measure, node, subject ORDER BY bucket) AS upto,
         sum(number) OVER (PARTITION BY label_group, measure, node, subject) AS total
     FROM summed
-),
-quantile AS (
-    SELECT
-        label_group, measure, node, subject,
-        min(bucket) FILTER (WHERE upto >= ceil(0.5 * total)) AS median,
-        min(bucket) FILTER (WHERE upto >= ceil(0.95 * total)) AS p95,
-        min(bucket) FILTER (WHERE upto >= ceil(0.99 * total)) AS p99
-    FROM ranked
-    GROUP BY label_group, measure, node, subject
 )
 SELECT
     label_group, measure, node, subject,
-    round(sign(median) * 2 / 2.02 * pow(1.02::DOUBLE, abs(median) - 1))::BIGINT AS median_ns,
-    round(sign(p95) * 2 / 2.02 * pow(1.02::DOUBLE, abs(p95) - 1))::BIGINT AS p95_ns,
-    round(sign(p99) * 2 / 2.02 * pow(1.02::DOUBLE, abs(p99) - 1))::BIGINT AS p99_ns
-FROM quantile
+    min(time_ns) FILTER (WHERE upto >= ceil(0.5 * total)) AS median_ns,
+    min(time_ns) FILTER (WHERE upto >= ceil(0.95 * total)) AS p95_ns,
+    min(time_ns) FILTER (WHERE upto >= ceil(0.99 * total)) AS p99_ns
+FROM ranked
+GROUP BY label_group, measure, node, subject

@@ -17,7 +17,7 @@
 -- brief: process, callback_share, callback_share_max, runs, threads, callback_ns, blocked_ns,
 --     wait_ns, callbacks, host, select_ns, take_ns, seen_ns, unknown_ns, executor_kind
 SELECT
-    g.label_group, u.host, u.process, u.executor_kind,
+    u.label_group, u.host, u.process, u.executor_kind,
     count(DISTINCT u.run) AS runs,
     count(*) AS threads,
     sum(COLUMNS([
@@ -27,6 +27,5 @@ SELECT
     sum(u.callback_ns) / nullif(sum(u.seen_ns), 0)::DOUBLE AS callback_share,
     max(u.callback_share) AS callback_share_max
 FROM executor_usage AS u
-JOIN run_group AS g ON u.run = g.run
-GROUP BY g.label_group, u.host, u.process, u.executor_kind
-ORDER BY u.host, u.process, u.executor_kind, g.label_group
+GROUP BY u.label_group, u.host, u.process, u.executor_kind
+ORDER BY u.host, u.process, u.executor_kind, u.label_group

@@ -16,7 +16,7 @@
 -- column: cause, cure
 -- brief: severity, title, runs, count, worst_run, subject, places, cure
 SELECT
-    g.label_group, f.severity, f.name,
+    f.label_group, f.severity, f.name,
     any_value(f.title) AS title,
     count(DISTINCT f.run) AS runs,
     count(*) AS places,
@@ -27,7 +27,6 @@ SELECT
     any_value(f.cause) AS cause,
     any_value(f.cure) AS cure
 FROM finding AS f
-JOIN run_group AS g ON f.run = g.run
-GROUP BY g.label_group, f.severity, f.name
+GROUP BY f.label_group, f.severity, f.name
 ORDER BY
-    list_position(['error', 'warning', 'info'], f.severity), runs DESC, f.name, g.label_group
+    list_position(['error', 'warning', 'info'], f.severity), runs DESC, f.name, f.label_group

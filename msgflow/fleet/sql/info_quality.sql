@@ -9,7 +9,7 @@
 -- column: affected, total, affected_percent, is_internal
 -- brief: scope, topic, measure, runs, affected (even 0), total, affected_percent
 SELECT
-    g.label_group, q.scope,
+    q.label_group, q.scope,
     CASE WHEN q.scope = 'topic' THEN q.subject END AS topic,
     q.measure,
     count(DISTINCT q.run) FILTER (WHERE q.affected > 0) AS runs,
@@ -18,6 +18,5 @@ SELECT
     100.0::DOUBLE * sum(q.affected) / nullif(sum(q.total), 0) AS affected_percent,
     bool_and(q.is_internal) AS is_internal
 FROM info_quality AS q
-JOIN run_group AS g ON q.run = g.run
 GROUP BY ALL
-ORDER BY q.scope, topic, q.measure, g.label_group
+ORDER BY q.scope, topic, q.measure, q.label_group

@@ -4,16 +4,14 @@
 -- kind: inline
 WITH listed AS (
     SELECT
-        g.label_group, d.topic_name, d.subscriber, 'reasons' AS name,
-        unnest(map_entries(d.reasons)) AS entry
-    FROM topics_delivery AS d
-    JOIN run_group AS g ON d.run = g.run
+        label_group, topic_name, subscriber, 'reasons' AS name,
+        unnest(map_entries(reasons)) AS entry
+    FROM topics_delivery
     UNION ALL
     SELECT
-        g.label_group, d.topic_name, d.subscriber, 'orphan_reasons',
-        unnest(map_entries(d.orphan_reasons))
-    FROM topics_delivery AS d
-    JOIN run_group AS g ON d.run = g.run
+        label_group, topic_name, subscriber, 'orphan_reasons',
+        unnest(map_entries(orphan_reasons))
+    FROM topics_delivery
 ),
 counted AS (
     SELECT

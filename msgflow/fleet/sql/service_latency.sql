@@ -11,7 +11,7 @@
 -- brief: service_name, client, round_trip_median_most_ns, round_trip_p99_most_ns,
 --     round_trip_max_ns, runs, requests, answered, server, not_taken, not_answered, not_received
 SELECT
-    g.label_group, s.service_name, s.server, s.client,
+    s.label_group, s.service_name, s.server, s.client,
     count(DISTINCT s.run) AS runs,
     sum(COLUMNS([
         'requests', 'answered', 'not_taken', 'not_answered', 'not_received', 'negative'
@@ -22,6 +22,5 @@ SELECT
     max(s.round_trip_max_ns) AS round_trip_max_ns,
     bool_and(s.is_internal) AS is_internal
 FROM service_latency AS s
-JOIN run_group AS g ON s.run = g.run
-GROUP BY g.label_group, s.service_name, s.server, s.client
-ORDER BY s.service_name, s.server, s.client, g.label_group
+GROUP BY s.label_group, s.service_name, s.server, s.client
+ORDER BY s.service_name, s.server, s.client, s.label_group

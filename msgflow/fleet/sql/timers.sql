@@ -16,7 +16,7 @@
 -- brief: node, callback, count, missed, lateness_p99_most_ns, lateness_max_ns, jitter_p99_most_ns,
 --     runs, lateness_median_most_ns, bunched
 SELECT
-    g.label_group, t.node, t.callback,
+    t.label_group, t.node, t.callback,
     count(DISTINCT t.run) AS runs,
     sum(COLUMNS(['count', 'missed', 'bunched']))::BIGINT,
     max(t.jitter_median_ns) AS jitter_median_most_ns,
@@ -29,6 +29,5 @@ SELECT
     sum(t.loss_affected)::BIGINT AS loss_affected,
     bool_and(t.is_internal) AS is_internal
 FROM timers AS t
-JOIN run_group AS g ON t.run = g.run
-GROUP BY g.label_group, t.node, t.callback
-ORDER BY t.node, t.callback, g.label_group
+GROUP BY t.label_group, t.node, t.callback
+ORDER BY t.node, t.callback, t.label_group

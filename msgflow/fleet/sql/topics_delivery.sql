@@ -15,7 +15,7 @@
 --     not_connected, cut_by_recording, orphans, orphan_reasons
 WITH merged AS (
     SELECT
-        g.label_group, d.topic_name, d.subscriber,
+        d.label_group, d.topic_name, d.subscriber,
         count(DISTINCT d.run) AS runs,
         count(DISTINCT d.run) FILTER (WHERE d.dropped + d.lost > 0) AS lossy_runs,
         sum(COLUMNS([
@@ -24,8 +24,7 @@ WITH merged AS (
         ]))::BIGINT,
         bool_and(d.is_internal) AS is_internal
     FROM topics_delivery AS d
-    JOIN run_group AS g ON d.run = g.run
-    GROUP BY g.label_group, d.topic_name, d.subscriber
+    GROUP BY d.label_group, d.topic_name, d.subscriber
 )
 SELECT
     m.label_group, m.topic_name, m.subscriber, m.runs, m.lossy_runs, m.published, m.delivered,

@@ -8,32 +8,29 @@
 --     is_internal
 -- brief: topic_name, subscriber, median_ns, p95_ns, max_ns, runs, takes, linked, negative,
 --     ambiguous, mean_ns, p99_ns, min_ns
-WITH merged AS (
-    SELECT
-        g.label_group, t.topic_name, t.subscriber,
-        count(DISTINCT t.run) AS runs,
-        sum(COLUMNS(['takes', 'linked', 'ambiguous', 'negative']))::BIGINT,
-        min(t.min_ns) AS min_ns,
-        CASE WHEN count(*) = 1 THEN any_value(t.median_ns) END AS median_ns,
-        round(sum(t.mean_ns * t.linked) / nullif(sum(t.linked), 0))::BIGINT AS mean_ns,
-        CASE WHEN count(*) = 1 THEN any_value(t.p95_ns) END AS p95_ns,
-        CASE WHEN count(*) = 1 THEN any_value(t.p99_ns) END AS p99_ns,
-        max(t.max_ns) AS max_ns,
-        bool_and(t.is_internal) AS is_internal
-    FROM topics_latency AS t
-    JOIN run_group AS g ON t.run = g.run
-    GROUP BY g.label_group, t.topic_name, t.subscriber
-)
 SELECT
-    m.label_group, m.topic_name, m.subscriber, m.runs, m.takes, m.linked, m.ambiguous, m.negative,
-    m.min_ns,
-    coalesce(m.median_ns, greatest(m.min_ns, least(m.max_ns, d.median_ns))) AS median_ns,
-    m.mean_ns,
-    coalesce(m.p95_ns, greatest(m.min_ns, least(m.max_ns, d.p95_ns))) AS p95_ns,
-    coalesce(m.p99_ns, greatest(m.min_ns, least(m.max_ns, d.p99_ns))) AS p99_ns,
-    m.max_ns, m.is_internal
-FROM merged AS m
+    t.label_group, t.topic_name, t.subscriber,
+    count(DISTINCT t.run) AS runs,
+    sum(COLUMNS(['takes', 'linked', 'ambiguous', 'negative']))::BIGINT,
+    min(t.min_ns) AS min_ns,
+    CASE
+        WHEN count(*) = 1 THEN any_value(t.median_ns)
+        ELSE greatest(min(t.min_ns), least(max(t.max_ns), any_value(d.median_ns)))
+    END AS median_ns,
+    round(sum(t.mean_ns * t.linked) / nullif(sum(t.linked), 0))::BIGINT AS mean_ns,
+    CASE
+        WHEN count(*) = 1 THEN any_value(t.p95_ns)
+        ELSE greatest(min(t.min_ns), least(max(t.max_ns), any_value(d.p95_ns)))
+    END AS p95_ns,
+    CASE
+        WHEN count(*) = 1 THEN any_value(t.p99_ns)
+        ELSE greatest(min(t.min_ns), least(max(t.max_ns), any_value(d.p99_ns)))
+    END AS p99_ns,
+    max(t.max_ns) AS max_ns,
+    bool_and(t.is_internal) AS is_internal
+FROM topics_latency AS t
 LEFT JOIN distributed AS d
-    ON d.measure = 'transport_latency' AND m.label_group = d.label_group
-    AND m.topic_name IS NOT DISTINCT FROM d.subject AND m.subscriber IS NOT DISTINCT FROM d.node
-ORDER BY m.topic_name, m.subscriber, m.label_group
+    ON d.measure = 'transport_latency' AND t.label_group = d.label_group
+    AND t.topic_name IS NOT DISTINCT FROM d.subject AND t.subscriber IS NOT DISTINCT FROM d.node
+GROUP BY t.label_group, t.topic_name, t.subscriber
+ORDER BY t.topic_name, t.subscriber, t.label_group

@@ -12,7 +12,7 @@
 -- brief: topic_name, publisher, rate_hz, period_median_least_ns, period_median_most_ns,
 --     period_max_ns, runs, count, period_min_ns
 SELECT
-    g.label_group, p.topic_name, p.publisher,
+    p.label_group, p.topic_name, p.publisher,
     count(DISTINCT p.run) AS runs,
     sum(p.count)::BIGINT AS count,
     CASE
@@ -26,6 +26,5 @@ SELECT
     max(p.period_max_ns) AS period_max_ns,
     bool_and(p.is_internal) AS is_internal
 FROM topics_rate AS p
-JOIN run_group AS g ON p.run = g.run
-GROUP BY g.label_group, p.topic_name, p.publisher
-ORDER BY p.topic_name, p.publisher, g.label_group
+GROUP BY p.label_group, p.topic_name, p.publisher
+ORDER BY p.topic_name, p.publisher, p.label_group

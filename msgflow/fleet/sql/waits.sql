@@ -8,30 +8,24 @@
 --     busy_total_max_ns, rest_total_min_ns, rest_total_max_ns, unknown, loss_affected, is_internal
 -- brief: node, callback, wait_median_ns, wait_max_ns, busy_worst_ns, runs, count,
 --     delayed_min, delayed_max, busy_total_min_ns, busy_total_max_ns
-WITH merged AS (
-    SELECT
-        g.label_group, w.node, w.callback,
-        count(DISTINCT w.run) AS runs,
-        sum(COLUMNS(['count', 'delayed_min', 'delayed_max']))::BIGINT,
-        CASE WHEN count(*) = 1 THEN any_value(w.wait_median_ns) END AS wait_median_ns,
-        max(w.wait_max_ns) AS wait_max_ns,
-        max(w.busy_worst_ns) AS busy_worst_ns,
-        sum(COLUMNS([
-            'busy_total_min_ns', 'busy_total_max_ns', 'rest_total_min_ns', 'rest_total_max_ns',
-            'unknown', 'loss_affected'
-        ]))::BIGINT,
-        bool_and(w.is_internal) AS is_internal
-    FROM waits AS w
-    JOIN run_group AS g ON w.run = g.run
-    GROUP BY g.label_group, w.node, w.callback
-)
 SELECT
-    m.label_group, m.node, m.callback, m.runs, m.count, m.delayed_min, m.delayed_max,
-    coalesce(m.wait_median_ns, least(m.wait_max_ns, d.median_ns)) AS wait_median_ns,
-    m.wait_max_ns, m.busy_worst_ns, m.busy_total_min_ns, m.busy_total_max_ns, m.rest_total_min_ns,
-    m.rest_total_max_ns, m.unknown, m.loss_affected, m.is_internal
-FROM merged AS m
+    w.label_group, w.node, w.callback,
+    count(DISTINCT w.run) AS runs,
+    sum(COLUMNS(['count', 'delayed_min', 'delayed_max']))::BIGINT,
+    CASE
+        WHEN count(*) = 1 THEN any_value(w.wait_median_ns)
+        ELSE least(max(w.wait_max_ns), any_value(d.median_ns))
+    END AS wait_median_ns,
+    max(w.wait_max_ns) AS wait_max_ns,
+    max(w.busy_worst_ns) AS busy_worst_ns,
+    sum(COLUMNS([
+        'busy_total_min_ns', 'busy_total_max_ns', 'rest_total_min_ns', 'rest_total_max_ns',
+        'unknown', 'loss_affected'
+    ]))::BIGINT,
+    bool_and(w.is_internal) AS is_internal
+FROM waits AS w
 LEFT JOIN distributed AS d
-    ON d.measure = 'callback_wait' AND m.label_group = d.label_group
-    AND m.node IS NOT DISTINCT FROM d.node AND m.callback IS NOT DISTINCT FROM d.subject
-ORDER BY m.busy_total_max_ns DESC, m.node, m.callback, m.label_group
+    ON d.measure = 'callback_wait' AND w.label_group = d.label_group
+    AND w.node IS NOT DISTINCT FROM d.node AND w.callback IS NOT DISTINCT FROM d.subject
+GROUP BY w.label_group, w.node, w.callback
+ORDER BY sum(w.busy_total_max_ns) DESC, w.node, w.callback, w.label_group

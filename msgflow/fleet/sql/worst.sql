@@ -8,7 +8,6 @@
 -- column: labels VARCHAR[]    Labels of the run, KEY=VALUE
 -- column: root_ns, path, source, root_kind
 -- column: root_id BIGINT      Identity of the root in the database of the run
--- column: has_database BOOLEAN  The lake has the database of the run
 -- brief: latency_ns, name, labels, run, root_ns, source
 WITH fitting AS (
     SELECT run, path, root_kind, root_id, root_ns, latency_ns
@@ -25,8 +24,7 @@ wanted AS (
 SELECT
     w.latency_ns, r.name, w.run,
     list_transform(map_entries(r.labels), lambda entry: entry.key || '=' || entry.value) AS labels,
-    w.root_ns, w.path, r.source, w.root_kind, w.root_id,
-    r.database_part IS NOT NULL AS has_database
+    w.root_ns, w.path, r.source, w.root_kind, w.root_id
 FROM wanted AS w
 JOIN run AS r ON w.run = r.run
 ORDER BY w.latency_ns DESC, w.run, w.path, w.root_ns, w.root_kind, w.root_id

@@ -12,7 +12,6 @@ import { NodesPage } from "./nodes.js";
 import { TopicsPage } from "./topics.js";
 import { Bar } from "./bar.js";
 import { ComparePage } from "./compare.js";
-import { LakePage } from "./lake.js";
 import { SqlPage } from "./sql.js";
 import { Follower } from "./follower.js";
 import { failed, waiting } from "./notice.js";
@@ -26,7 +25,6 @@ const PAGES = {
   topics: ["Topics", TopicsPage],
   compare: ["Compare", ComparePage],
   sql: ["SQL", SqlPage],
-  lake: ["Lake", LakePage],
 };
 // Pages that are sections of others: where their addresses lead, and what their own words are there.
 const MOVED = {
@@ -35,8 +33,7 @@ const MOVED = {
   executors: () => ({ page: "nodes" }),
   losses: ({ topic }) => ({ page: "topics", topic: null, lost: topic }),
 };
-// Of a lake, which is no database; and what only a server answers.
-const OTHER_PAGES = ["lake"];
+// What only a server answers.
 const SERVED_PAGES = ["sql"];
 
 // What the server said in place of an answer.
@@ -131,7 +128,7 @@ class App {
         [page],
       ) => (this.source.pages
         ? this.source.pages.includes(page)
-        : !OTHER_PAGES.includes(page) && (this.source.isServed || !SERVED_PAGES.includes(page)) &&
+        : (this.source.isServed || !SERVED_PAGES.includes(page)) &&
           !this.source.absent?.includes(page))
       ),
     );

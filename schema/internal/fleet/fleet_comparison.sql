@@ -44,18 +44,15 @@ WITH of_run AS (
     WHERE value_ns IS NOT NULL
     GROUP BY side, subject, unit, run
 ),
-deepest AS (
-    SELECT side, subject, unit, max(depth) AS depth FROM of_run GROUP BY side, subject, unit
-),
 allowing AS (
     SELECT
-        u.side, u.subject, w.depth,
-        count(*) FILTER (u.depth >= w.depth) AS units,
-        count(*) FILTER (u.depth > 0) AS whole
-    FROM deepest AS u
-    JOIN (SELECT DISTINCT subject, depth FROM deepest WHERE depth > 0) AS w
-        ON u.subject = w.subject
-    GROUP BY u.side, u.subject, w.depth
+        r.side, r.subject, w.depth,
+        count(DISTINCT r.unit) FILTER (WHERE r.depth >= w.depth) AS units,
+        count(DISTINCT r.unit) FILTER (WHERE r.depth > 0) AS whole
+    FROM of_run AS r
+    JOIN (SELECT DISTINCT subject, depth FROM of_run WHERE depth > 0) AS w
+        ON r.subject = w.subject
+    GROUP BY r.side, r.subject, w.depth
 ),
 wanted AS (
     SELECT subject, max(depth) AS depth
@@ -78,90 +75,66 @@ counted AS (
 ),
 of_side AS (
     SELECT
-        m.side, m.subject, m.statistic,
-        sum(m.number)::BIGINT AS flows,
-        sum(m.roots) AS roots,
-        sum(m.reached) AS reached,
-        sum(m.loss_affected)::BIGINT AS loss_affected,
-        sum(m.ambiguous)::BIGINT AS ambiguous,
-        bool_or(m.is_cut) AS is_cut,
-        count(DISTINCT m.unit) FILTER (m.value_ns IS NOT NULL) AS units,
-        coalesce(bool_and(m.is_enough) FILTER (c.run IS NOT NULL), false) AS is_enough
-    FROM measured AS m
-    LEFT JOIN counted AS c ON m.side = c.side AND m.subject = c.subject AND m.run = c.run
-    GROUP BY m.side, m.subject, m.statistic
+        side, subject, statistic,
+        sum(number)::BIGINT AS flows,
+        sum(roots) AS roots,
+        sum(reached) AS reached,
+        sum(loss_affected)::BIGINT AS loss_affected,
+        sum(ambiguous)::BIGINT AS ambiguous,
+        bool_or(is_cut) AS is_cut,
+        count(DISTINCT unit) FILTER (WHERE value_ns IS NOT NULL) AS units,
+        coalesce(bool_and(is_enough) FILTER (WHERE counted.run IS NOT NULL), false) AS is_enough
+    FROM measured
+    LEFT JOIN counted USING (side, subject, run)
+    GROUP BY side, subject, statistic
 ),
 unit AS (
-    SELECT m.side, m.unit, m.subject, m.statistic, median(m.value_ns) AS value_ns
-    FROM measured AS m
-    JOIN counted AS c ON m.side = c.side AND m.subject = c.subject AND m.run = c.run
-    GROUP BY m.side, m.unit, m.subject, m.statistic
+    SELECT side, unit, subject, statistic, median(value_ns) AS value_ns
+    FROM measured
+    JOIN counted USING (side, subject, run)
+    GROUP BY side, unit, subject, statistic
 ),
-scaled AS (SELECT *, min(value_ns) OVER (PARTITION BY subject) > 0 AS is_log FROM unit),
-ranked AS (
+scaled AS (
     SELECT
-        side, subject, statistic, is_log,
-        CASE WHEN is_log THEN ln(value_ns) ELSE value_ns END AS x,
-        row_number() OVER (PARTITION BY side, subject, statistic ORDER BY value_ns, unit) AS nth,
-        count(*) OVER (PARTITION BY side, subject, statistic) AS number,
-        (number // 5) AS trimmed
-    FROM scaled
+        side, subject, statistic,
+        min(value_ns) OVER (PARTITION BY subject) > 0 AS is_log,
+        CASE WHEN is_log THEN ln(value_ns) ELSE value_ns END AS x
+    FROM unit
 ),
-ends AS (
+listed AS (
     SELECT
         side, subject, statistic,
         any_value(is_log) AS is_log,
-        any_value(number) AS number,
-        any_value(number - 2 * trimmed) AS kept,
-        avg(x) FILTER (nth > trimmed AND nth <= number - trimmed) AS centre,
-        min(x) FILTER (nth > trimmed) AS lowest,
-        max(x) FILTER (nth <= number - trimmed) AS highest,
+        list(x ORDER BY x) AS every,
+        len(every) AS number,
+        every[number // 5 + 1:number - number // 5] AS inner_part,
+        len(inner_part) AS kept,
+        list_avg(inner_part) AS centre,
         quantile_cont(x, 0.75) - quantile_cont(x, 0.25) AS spread
-    FROM ranked
+    FROM scaled
     GROUP BY side, subject, statistic
 ),
 centre AS (
     SELECT
-        e.side, e.subject, e.statistic,
-        any_value(e.is_log) AS is_log,
-        any_value(e.number) AS number,
-        any_value(e.kept) AS kept,
-        any_value(e.centre) AS centre,
-        any_value(CASE
-            WHEN e.is_log THEN 100 * (exp(e.spread) - 1) ELSE 100 * e.spread / abs(e.centre)
-        END) AS spread_percent,
+        side, subject, statistic, is_log, number, kept, centre,
+        CASE WHEN is_log THEN 100 * (exp(spread) - 1) ELSE 100 * spread / abs(centre) END
+            AS spread_percent,
         -- How far the trimmed mean may be off, squared.
-        var_samp(greatest(e.lowest, least(e.highest, r.x))) * (any_value(e.number) - 1)
-            / any_value(e.kept * (e.kept - 1)) AS error
-    FROM ends AS e
-    JOIN ranked AS r ON e.side = r.side AND e.subject = r.subject AND e.statistic = r.statistic
-    GROUP BY e.side, e.subject, e.statistic
+        list_var_samp(list_transform(
+            every, lambda x: greatest(inner_part[1], least(inner_part[-1], x))
+        )) * (number - 1) / (kept * (kept - 1)) AS error
+    FROM listed
 ),
 known AS (
     SELECT
-        s.side, s.subject, s.statistic, s.flows, s.roots, s.reached, s.loss_affected, s.ambiguous,
-        s.is_cut, s.units, s.is_enough, c.is_log, c.number, c.kept, c.centre, c.error,
-        c.spread_percent,
-        round(CASE WHEN c.is_log THEN exp(c.centre) ELSE c.centre END)::BIGINT AS value_ns
-    FROM of_side AS s
-    LEFT JOIN centre AS c ON s.side = c.side AND s.subject = c.subject AND s.statistic = c.statistic
+        *, round(CASE WHEN is_log THEN exp(centre) ELSE centre END)::BIGINT AS value_ns
+    FROM of_side
+    LEFT JOIN centre USING (side, subject, statistic)
 ),
 paired AS (
     SELECT
-        coalesce(a.subject, b.subject) AS subject,
-        coalesce(a.statistic, b.statistic) AS statistic,
-        a.value_ns AS a_ns, b.value_ns AS b_ns,
+        a, b,
         coalesce(a.is_log, b.is_log) AS is_log,
-        coalesce(a.number, 0) AS a_count,
-        coalesce(b.number, 0) AS b_count,
-        a.spread_percent AS a_spread_percent, b.spread_percent AS b_spread_percent,
-        coalesce(a.flows, 0) AS a_flows,
-        coalesce(b.flows, 0) AS b_flows,
-        a.reached / nullif(a.roots, 0) AS a_share,
-        b.reached / nullif(b.roots, 0) AS b_share,
-        a.loss_affected AS a_loss_affected, b.loss_affected AS b_loss_affected,
-        a.ambiguous AS a_ambiguous, b.ambiguous AS b_ambiguous,
-        coalesce(a.is_cut, false) OR coalesce(b.is_cut, false) AS is_cut,
         b.centre - a.centre AS difference,
         sqrt(a.error + b.error) AS error,
         -- Welch and Satterthwaite.
@@ -171,7 +144,7 @@ paired AS (
             WHEN a.number IS NULL AND b.number IS NULL THEN 'too few values'
             WHEN b.number IS NULL THEN 'only in A'
             WHEN a.number IS NULL THEN 'only in B'
-            WHEN coalesce(a.statistic, b.statistic) = 'max' THEN 'not estimated'
+            WHEN a.statistic = 'max' THEN 'not estimated'
             WHEN least(a.units, b.units) < $least_units THEN 'too few runs'
             WHEN NOT a.is_enough OR NOT b.is_enough OR least(a.number, b.number) < $least_units
                 THEN 'too few values'
@@ -200,28 +173,30 @@ bounded AS (
         *,
         CASE
             WHEN is_log THEN 100 * (exp(difference - off) - 1)
-            WHEN a_ns > 0 THEN 100 * (difference - off) / a_ns
+            WHEN a.value_ns > 0 THEN 100 * (difference - off) / a.value_ns
         END AS low,
         CASE
             WHEN is_log THEN 100 * (exp(difference + off) - 1)
-            WHEN a_ns > 0 THEN 100 * (difference + off) / a_ns
+            WHEN a.value_ns > 0 THEN 100 * (difference + off) / a.value_ns
         END AS high
     FROM judged
 )
 SELECT
-    statistic, a_ns, b_ns,
+    coalesce(a.statistic, b.statistic) AS statistic,
+    a.value_ns AS a_ns,
+    b.value_ns AS b_ns,
     CASE WHEN a_ns > 0 THEN round(100.0 * (b_ns - a_ns) / a_ns, 3) END AS change_percent,
     CASE WHEN reason IS NULL THEN round(low, 3) END AS low_percent,
     CASE WHEN reason IS NULL THEN round(high, 3) END AS high_percent,
     CASE
         WHEN reason IS NOT NULL THEN reason
-        WHEN difference - off <= 0 AND difference + off >= 0 THEN 'no difference shown'
+        WHEN abs(difference) <= off THEN 'no difference shown'
         WHEN abs(b_ns - a_ns) < $at_least * abs(a_ns) THEN 'about equal'
-        WHEN difference - off > 0 THEN 'B is longer'
+        WHEN difference > 0 THEN 'B is longer'
         ELSE 'B is shorter'
     END AS verdict,
-    round(a_spread_percent, 2) AS a_spread_percent,
-    round(b_spread_percent, 2) AS b_spread_percent,
+    round(a.spread_percent, 2) AS a_spread_percent,
+    round(b.spread_percent, 2) AS b_spread_percent,
     b_ns - a_ns AS difference_ns,
     CASE
         WHEN reason IS NULL AND is_log THEN round(a_ns * low / 100)
@@ -231,10 +206,18 @@ SELECT
         WHEN reason IS NULL AND is_log THEN round(a_ns * high / 100)
         WHEN reason IS NULL THEN round(difference + off)
     END::BIGINT AS high_ns,
-    a_count, b_count, a_flows, b_flows,
-    round(a_share, 4) AS a_share,
-    round(b_share, 4) AS b_share,
-    a_loss_affected, b_loss_affected, a_ambiguous, b_ambiguous, is_cut, subject
+    coalesce(a.number, 0) AS a_count,
+    coalesce(b.number, 0) AS b_count,
+    coalesce(a.flows, 0) AS a_flows,
+    coalesce(b.flows, 0) AS b_flows,
+    round(a.reached / nullif(a.roots, 0), 4) AS a_share,
+    round(b.reached / nullif(b.roots, 0), 4) AS b_share,
+    a.loss_affected AS a_loss_affected,
+    b.loss_affected AS b_loss_affected,
+    a.ambiguous AS a_ambiguous,
+    b.ambiguous AS b_ambiguous,
+    coalesce(a.is_cut, false) OR coalesce(b.is_cut, false) AS is_cut,
+    coalesce(a.subject, b.subject) AS subject
 FROM bounded
 ORDER BY
     subject, list_position(['median', 'mean', 'p95', 'p99', 'max'], statistic)
