@@ -1,7 +1,7 @@
 -- description: What the rows of a comparison of two runs (`compared`: of `main.comparison`) do not
 --     show, a sentence each: what was lost, what is left out, what verdicts are said of.
 -- grain: one row per sentence
--- like: comparison
+-- like: compare
 -- param: run_a, run_b, what
 WITH lost AS (
     SELECT run_id, coalesce(sum(discarded_event_count), 0)::BIGINT AS events
