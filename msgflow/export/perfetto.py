@@ -147,15 +147,15 @@ class _Writer:
         self.write(clock_snapshot={"clocks": clocks}, sequence_flags=flags)
         for row in self.rows("perfetto_process"):
             pid = self.own("pid", row["pid"], row["process_id"])
-            process = {"pid": pid, "process_name": row["name"]}
-            self.track("process", row["process_id"], process=process)
+            described = {"pid": pid, "process_name": row["name"]}
+            self.track("process", row["process_id"], process=described)
         for row in self.rows("perfetto_thread"):
             thread_id, process_id = row["thread_id"], row["process_id"]
             tid = self.own("tid", row["tid"], thread_id)
             self.threads[thread_id] = {"pid": self.own("pid", row["pid"], process_id), "tid": tid}
-            thread = {**self.threads[thread_id], "thread_name": row["name"]}
+            described = {**self.threads[thread_id], "thread_name": row["name"]}
             process = self.track("process", process_id)
-            self.track("thread", thread_id, parent_uuid=process, thread=thread)
+            self.track("thread", thread_id, parent_uuid=process, thread=described)
 
     def slices(self, query: str) -> tuple[int, int]:
         """Return how many slices a query has, and how many arrows begin at them.
@@ -168,7 +168,7 @@ class _Writer:
             start_ns, end_ns = row.pop("start_ns"), row.pop("end_ns")
             outgoing = row.pop("outgoing", None)
             thread, track = row.pop("thread_id", None), row.pop("track", None)
-            place = self.tracks.get(("thread", thread))
+            place: Any = self.tracks.get(("thread", thread))
             if track is not None:
                 place = self.track(
                     track, thread, row.pop("host_id", None), parent_uuid=place, name=track

@@ -282,7 +282,7 @@ def test_tracks_belong_to_processes_that_are_told_apart(exported: Exported) -> N
 def test_counters_have_rates_and_queues(exported: Exported) -> None:
     """Each publisher and subscription has a track of its own, in the order of their ids."""
     connection, decoded = exported
-    rates = []
+    rates: list[list[Any]] = []
     for (publisher,) in connection.execute(
         "SELECT publisher_id FROM publisher ORDER BY 1"
     ).fetchall():
