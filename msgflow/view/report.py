@@ -289,12 +289,6 @@ class _Maker:
             "stretches": [],
             "count": 0,
         }
-        if not self.asked.length_ns:
-            self.keep_stretch(0, window, None)
-            self.parts["edge?"] = encode(self.asked.rows("edge", window))
-            head["stretches"] = [{"start": 0, "end": 1, "whole": True}]
-            head["notes"] = self.notes
-            return head
         rows = self.rows_on(paths) if self.through is not None else None
         (count,) = self.asked.rows("segment_count", window)["count"].to_pylist()
         head["count"] = count
