@@ -122,23 +122,10 @@ class SharedDatabase:
         with self._changed:
             answers, base = self._current()
             self.require(generation)
-            cursor = self._new_cursor(base)
-        started(cursor.interrupt)
-        return self._answer(answers, cursor, name, params)
-
-    def _new_cursor(self, base: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnection:
-        cursor = base.cursor()
-        self._cursors.add(cursor)
-        return cursor
-
-    def _answer(
-        self,
-        answers: Answers,
-        cursor: duckdb.DuckDBPyConnection,
-        name: str,
-        params: dict[str, Any],
-    ) -> bytes:
+            cursor = base.cursor()
+            self._cursors.add(cursor)
         try:
+            started(cursor.interrupt)
             content = self._turns.ask(lambda: answers.pages.answer(cursor, name, params))
         except (MsgflowError, duckdb.Error):
             self.require(answers.generation)  # else it was interrupted, or read another file
@@ -187,22 +174,6 @@ class SharedDatabase:
         if self._answers is None or self._answers.generation != generation:
             self._forget()
             self._answers = Answers(generation, Pages())
-        ahead = [self._answers, self._base]
-        with suppress(RuntimeError):  # there are too many threads: the page asks itself
-            threading.Thread(target=self._ask_ahead, args=ahead, daemon=True).start()
-
-    def _ask_ahead(self, answers: Answers, base: duckdb.DuckDBPyConnection) -> None:
-        """Ask for the timeline of the latest run before the page does.
-
-        The bars of a large run are counted once, which takes longer than a browser needs to open.
-        """
-        with self._changed:
-            if base is not self._base:
-                return
-            cursor = self._new_cursor(base)
-        # The page asks for it too, and shows the error.
-        with suppress(MsgflowError, duckdb.Error):
-            self._answer(answers, cursor, "segments", {})
 
     def _free_when_idle(self) -> None:
         """Close the database whenever no question was answered for a while."""
