@@ -181,8 +181,10 @@ class _Writer:
             }
             if "kind" in row:
                 row[f"{row.pop('kind')}_id"] = row.pop("id")
-            fields = json.loads(row.pop("fields", "{}"))
-            said = {name: value for name, value in row.items() if value is not None} | fields
+            fields = row.pop("fields", None)
+            said = {name: value for name, value in row.items() if value is not None}
+            if fields is not None:
+                said |= json.loads(fields)
             what["debug_annotations"] = [self.note(*each) for each in said.items()]
             if end_ns > start_ns:
                 self.event(start_ns, place, "SLICE_BEGIN", **what)
