@@ -13,38 +13,40 @@
 -- param: run_name VARCHAR  Name of the run
 -- param: identity VARCHAR = ''  What tells the run from others; ids are computed from it
 WITH RECURSIVE place AS (
-    SELECT 'callback_instance' AS kind, i.callback_instance_id AS id, i.start_ns AS at_ns
+    SELECT
+        i.run_id, l.is_internal, 'callback_instance' AS kind, i.callback_instance_id AS id,
+        i.start_ns AS at_ns
     FROM main.callback_instance AS i
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-    WHERE i.run_id = $run_id AND NOT l.is_internal
     UNION ALL
-    SELECT 'publication', b.publication_id, b.start_ns
+    SELECT b.run_id, p.is_internal, 'publication', b.publication_id, b.start_ns
     FROM main.publication AS b
     LEFT JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
-    WHERE b.run_id = $run_id AND NOT coalesce(p.is_internal, false)
     UNION ALL
-    SELECT 'take', t.take_id, t.taken_ns
+    SELECT t.run_id, s.is_internal, 'take', t.take_id, t.taken_ns
     FROM main.take AS t
     LEFT JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
-    WHERE t.run_id = $run_id AND NOT coalesce(s.is_internal, false)
     UNION ALL
-    SELECT 'request', q.request_id, coalesce(q.sent_ns, q.taken_ns)
-    FROM main.request AS q
+    SELECT
+        q.run_id, coalesce(c.is_internal, s.is_internal), q.kind, q.id,
+        coalesce(q.sent_ns, q.taken_ns)
+    FROM (
+        SELECT
+            run_id, 'request' AS kind, request_id AS id, sent_ns, taken_ns, client_id, service_id
+        FROM main.request
+        UNION ALL
+        SELECT run_id, 'response', response_id, sent_ns, taken_ns, client_id, service_id
+        FROM main.response
+    ) AS q
     LEFT JOIN main.client AS c ON q.client_id = c.client_id
     LEFT JOIN main.service AS s ON q.service_id = s.service_id
-    WHERE q.run_id = $run_id AND NOT coalesce(c.is_internal, s.is_internal, false)
-    UNION ALL
-    SELECT 'response', r.response_id, coalesce(r.sent_ns, r.taken_ns)
-    FROM main.response AS r
-    LEFT JOIN main.client AS c ON r.client_id = c.client_id
-    LEFT JOIN main.service AS s ON r.service_id = s.service_id
-    WHERE r.run_id = $run_id AND NOT coalesce(c.is_internal, s.is_internal, false)
 ),
 otlp_vertex AS MATERIALIZED (
     SELECT derive.vertex_key(kind, id)::BIGINT AS key, kind, id, 0 AS depth
     FROM place
-    WHERE CASE WHEN $keys IS NULL THEN at_ns >= $start_ns AND at_ns < $end_ns
-        ELSE list_contains($keys, derive.vertex_key(kind, id)) END
+    WHERE run_id = $run_id AND is_internal IS NOT true
+        AND CASE WHEN $keys IS NULL THEN at_ns >= $start_ns AND at_ns < $end_ns
+            ELSE list_contains($keys, derive.vertex_key(kind, id)) END
 ),
 described AS MATERIALIZED (
     SELECT
