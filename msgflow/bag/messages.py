@@ -145,7 +145,7 @@ def _tables(reader: Any, most_bytes: int) -> Iterator[pa.Table]:
     types = reader.typestore.fielddefs
     header = ("header", (Nodetype.NAME, _HEADER))
     with_header = {name for name, (_, fields) in types.items() if header in fields}
-    rows: list[tuple[Any, ...]] = []
+    rows: list[dict[str, Any]] = []
     number = 0
     packed = any(getattr(each, "compression_mode", None) == "message" for each in reader.readers)
     left = most_bytes
@@ -159,24 +159,25 @@ def _tables(reader: Any, most_bytes: int) -> Iterator[pa.Table]:
             stamp_ns = header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
             frame_id = header.frame_id
         rows.append(
-            (number, connection.topic, connection.msgtype, received_ns, len(data), stamp_ns,
-             frame_id)
-        )  # fmt: skip
+            {
+                "message": number,
+                "topic_name": connection.topic,
+                "type_name": connection.msgtype,
+                "received_ns": received_ns,
+                "size_bytes": len(data),
+                "stamp_ns": stamp_ns,
+                "frame_id": frame_id,
+            }
+        )
         if len(rows) == _ROWS_AT_ONCE:
-            yield _table(rows)
+            yield pa.Table.from_pylist(rows, _SCHEMA)
             rows = []
     if number != reader.message_count:
         raise ValueError(
             f"it has {number:,} of the {reader.message_count:,} messages that it names"
         )
     if rows or not number:
-        yield _table(rows)
-
-
-def _table(rows: list[tuple[Any, ...]]) -> pa.Table:
-    columns = zip(*rows, strict=True) if rows else [()] * len(_SCHEMA)
-    arrays = [pa.array(column, field.type) for column, field in zip(columns, _SCHEMA, strict=True)]
-    return pa.Table.from_arrays(arrays, schema=_SCHEMA)
+        yield pa.Table.from_pylist(rows, _SCHEMA)
 
 
 def join_bag(

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ import pyarrow as pa
 from msgflow.errors import UsageError
 from msgflow.events.formats import EventFormat, table_writer
 from msgflow.events.sequence import COLUMNS, Sequencer, common_columns
-from msgflow.files.temporary_owner import mark
+from msgflow.files.atomic_directory import replacing_entries
 from msgflow.result.plain import any_within
 from msgflow.sql.json_fields import column_name, exact
 from msgflow.sql.quoting import identifier
@@ -36,14 +35,20 @@ def write_event_tables(
     directory: Path,
     progress: Callable[[Progress], None] | None = None,
 ) -> int:
-    """Write one file per event name to a new directory, and return the number of events.
+    """Write one file per event name to an empty or new directory; return the number of events.
 
     `ros2:rcl_init` goes to `ros2.rcl_init.parquet`. The columns are those of `COLUMNS`, then the
     fields; one that is called like a column before it is called `field_` and its name. In CSV,
-    lists and structures are JSON. The directory appears when all is written.
+    lists and structures are JSON. The files appear when all is written.
     """
-    with _new_directory(directory) as temporary, contextlib.ExitStack() as opened:
-        files = _Files(temporary, form, opened)
+    names: list[str] = []
+    with (
+        replacing_entries(directory, names) as temporary,
+        contextlib.ExitStack() as opened,
+    ):
+        if any(path != temporary for path in directory.iterdir()):
+            raise UsageError(f"the directory is not empty — {directory}", "choose another with -o")
+        files = _Files(temporary, form, opened, names)
         # CSV holds no nested values, Parquet no structure without a member.
         is_text = pa.types.is_nested if form is EventFormat.CSV else _has_empty_structure
         sequencer = opened.enter_context(Sequencer(selection.traces.traces, partial(_row, is_text)))
@@ -60,12 +65,14 @@ def write_event_tables(
 class _Files:
     """The files being written; few large pieces go to each, rather than many small ones."""
 
-    def __init__(self, directory: Path, form: EventFormat, opened: contextlib.ExitStack) -> None:
+    def __init__(
+        self, directory: Path, form: EventFormat, opened: contextlib.ExitStack, names: list[str]
+    ) -> None:
         self._directory = directory
+        self._names = names
         self._form = form
         self._opened = opened
         self._writers: dict[str, Any] = {}
-        self._taken: set[str] = set()
         self._held: dict[str, list[pa.Table]] = {}
         self._bytes = 0
 
@@ -90,11 +97,12 @@ class _Files:
         stem = base = _UNSAFE.sub("_", name.replace(":", ".")).lstrip(".") or "event"
         number = 1
         # Some file systems do not tell upper from lower case.
-        while stem.lower() in self._taken:
+        taken = {name.lower() for name in self._names}
+        while f"{stem}.{self._form}".lower() in taken:
             number += 1
             stem = f"{base}-{number}"
-        self._taken.add(stem.lower())
-        return f"{stem}.{self._form}"
+        self._names.append(f"{stem}.{self._form}")
+        return self._names[-1]
 
 
 def _has_empty_structure(data_type: pa.DataType) -> bool:
@@ -114,23 +122,3 @@ def _row(is_text: Callable[[pa.DataType], bool], name: str, payload: pa.Schema) 
         taken.add(column.lower())
         parts.append(f"{expression} AS {identifier(column)}")
     return ", ".join(parts)
-
-
-@contextlib.contextmanager
-def _new_directory(directory: Path) -> Iterator[Path]:
-    temporary = directory.with_name(f".{directory.name}.{mark()}.part")
-    try:
-        if directory.exists() and any(directory.iterdir()):
-            raise UsageError(f"the directory is not empty — {directory}", "choose another with -o")
-        temporary.mkdir()
-        try:
-            yield temporary
-            temporary.replace(directory)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise UsageError(
-            f"cannot write the directory: {reason} — {directory}",
-            "give a directory in a place that exists and can be written with -o",
-        ) from error

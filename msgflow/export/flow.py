@@ -143,16 +143,8 @@ class Flow:
         }
 
     def to_json(self) -> str:
-        """Return what `to_dict` returns as JSON, one node or edge per line."""
-        content = self.to_dict()
-        parts = []
-        for name, value in content.items():
-            if name in ("nodes", "edges") and value:
-                rows = ",\n    ".join(json.dumps(row, ensure_ascii=False) for row in value)
-                parts.append(f'  "{name}": [\n    {rows}\n  ]')
-            else:
-                parts.append(f'  "{name}": {json.dumps(value, ensure_ascii=False)}')
-        return "{\n" + ",\n".join(parts) + "\n}"
+        """Return what `to_dict` returns as JSON."""
+        return json.dumps(self.to_dict(), ensure_ascii=False, indent=1)
 
     def __repr__(self) -> str:
         return f"<Flow of {self.start.kind} {self.start.id}: {len(self.nodes)} nodes>"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
-from itertools import chain, pairwise, repeat
+from itertools import repeat
 from operator import add
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeVar
@@ -135,12 +135,7 @@ def json_rows(result: QueryResult) -> Iterator[str]:
 
 
 def _json_array(result: QueryResult) -> Iterator[str]:
-    if not len(result):
-        yield "[]"
-    before = "["
-    for row, following in pairwise(chain(json_rows(result), [None])):
-        yield f"{before}{row}{']' if following is None else ','}"
-        before = " "
+    yield "[" + ",\n ".join(json_rows(result)) + "]"
 
 
 def write_csv(

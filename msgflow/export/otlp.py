@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
@@ -20,12 +23,7 @@ if TYPE_CHECKING:
     from msgflow.run.slice import Slice
     from msgflow.sql.value import Value
 
-_COUNTS = """
-SELECT
-    coalesce(max(batch) + 1, 0), count(DISTINCT trace_id), count(*),
-    coalesce(sum(len(link_span_ids)), 0)::BIGINT
-FROM temp.otlp_span
-"""
+_SPANS_AT_ONCE = 2_000
 
 
 @dataclass(frozen=True)
@@ -60,21 +58,46 @@ def write_otlp(
     run = part.one_run(connection, "traces of OpenTelemetry")
     of_run = {"runs": [run.run_id], "run_id": run.run_id, **part.window([run]).bindings}
     ((identity,),) = internal_sql().run(connection, "run_identity", of_run).fetchall()
-    chosen = {**of_run, "identity": identity or run.name}
+    chosen = {**of_run, "run_name": run.name, "identity": identity or run.name}
     if choice is not None:
         places = require_places(connection, [run], choice)
         flows = internal_sql().run(connection, "otlp_flow", {**of_run, **choice, **places})
         chosen["keys"] = [key for (key,) in flows.fetchall()]
-    try:
-        internal_sql().keep(connection, "otlp_span", chosen)
-        ((batches, traces, spans, links),) = connection.sql(_COUNTS).fetchall()
-        values = {"run_name": run.name, "version": __version__}
-        with replacing(target) as temporary, temporary.open("w", encoding="utf-8") as file:
-            for batch in range(batches):
-                request = {**values, "batch": batch}
-                rows = internal_sql().run(connection, "otlp_request", request)
-                ((text,),) = rows.fetchall()
-                file.write(f"{text}\n")
-    finally:
-        connection.execute("DROP TABLE IF EXISTS temp.otlp_span")
+    rows = internal_sql().rows(connection, "otlp_span", chosen)
+    traces = spans = links = 0
+    with replacing(target) as temporary, temporary.open("w", encoding="utf-8") as file:
+        while batch := list(islice(rows, _SPANS_AT_ONCE)):
+            spans += len(batch)
+            traces += sum(not row["span"]["parentSpanId"] for row in batch)
+            links += sum(len(row["span"]["links"]) for row in batch)
+            file.write(f"{json.dumps(_request(batch), ensure_ascii=False)}\n")
     return ExportedTraces(run, traces, spans, links)
+
+
+def _request(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    resources: dict[Any, list[dict[str, Any]]] = defaultdict(list)
+    for row in rows:
+        identity = {f"msgflow.{row['kind']}_id": row["id"]}
+        span = row["span"] | {"attributes": _attributes(row["attributes"] | identity)}
+        resources[tuple(row["resource"].items())].append(span)
+    scope = {"name": "msgflow", "version": __version__}
+    return {
+        "resourceSpans": [
+            {
+                "resource": {"attributes": _attributes(dict(resource))},
+                "scopeSpans": [{"scope": scope, "spans": spans}],
+            }
+            for resource, spans in resources.items()
+        ]
+    }
+
+
+def _attributes(values: Mapping[str, str | int | None]) -> list[dict[str, Any]]:
+    return [
+        {
+            "key": name,
+            "value": {"stringValue": value} if isinstance(value, str) else {"intValue": str(value)},
+        }
+        for name, value in values.items()
+        if value is not None
+    ]

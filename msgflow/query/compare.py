@@ -97,7 +97,7 @@ def compare(
     both: dict[str, Value] = {"run_a": first.run_id, "run_b": second.run_id}
     both["at_least"] = share_of(at_least)
     both |= _windows(window, (first, second))
-    asked = bind(internal_sql().header("comparison"), given | both, "msgflow compare")
+    asked = bind(internal_sql().header("compare"), given | both, "msgflow compare")
     _require_sense(asked)
     if explain and asked["what"] != "paths":
         raise UsageError(f"only changes of paths have parts — {asked['what']}", "leave out --what")
@@ -264,7 +264,7 @@ def warm_up(connection: duckdb.DuckDBPyConnection, run: Run) -> float:
     """
     both: dict[str, Value] = {"run_a": run.run_id, "run_b": run.run_id, "resamples": 0}
     both |= {"at_least": 0.0, **_windows((), (run, run))}
-    asked = bind(internal_sql().header("comparison"), both, "msgflow compare")
+    asked = bind(internal_sql().header("compare"), both, "msgflow compare")
     _require_sense(asked)
     return _warm_up(_compared(connection, asked, run, run, is_strict=False))
 
@@ -286,7 +286,7 @@ def _compared(
     for run in (first, second):
         require_places(connection, [run], {"from": asked["from"], "to": asked["to"]})
     with query_errors("the comparison", "the comparison failed: {}"):
-        table = internal_sql().run(connection, "comparison", asked).to_arrow_table()
+        table = internal_sql().run(connection, "compare", asked).to_arrow_table()
     header = read(resource_directory("schema") / "public" / "comparison.sql")
     result = QueryResult(table, header, (first, second))
     if is_strict:

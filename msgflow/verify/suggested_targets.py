@@ -34,7 +34,10 @@ def suggest_targets(
     Comments behind its first line say what speaks against the run. `results` are those of
     `QUERIES`, by name, without the first `skipped` seconds; `margin` is a share.
     """
-    tables = {name.replace("-", "_"): table for name, table in results.items()}
+    tables = {
+        name.replace("-", "_"): table.append_column("place", [range(table.num_rows)])
+        for name, table in results.items()
+    }
     values = {"margin": margin, "least_values": LEAST_VALUES}
     with open_memory() as con, registered(con, **tables):
         targets = list(internal_sql().rows(con, "suggested_target", values))

@@ -112,6 +112,11 @@ class Question:
             raise UsageError(f"a flow begins with one of {', '.join(KINDS)} — {kind}")
         return str(kind)
 
+    @cached_property
+    def paths(self) -> pa.Table:
+        """The paths of the run, as the page query path has them."""
+        return self.rows("path")
+
     def text(self, name: str) -> str:
         """Return a parameter as text."""
         return str(self.params.get(name))

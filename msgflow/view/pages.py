@@ -100,7 +100,7 @@ class Pages:
             return summary.why_section(asked)
         if name != "blame":
             return summary.query_section(asked, name, through)
-        paths = [row["path_id"] for row in asked.rows("path").to_pylist() if through in row["path"]]
+        paths = [row["path_id"] for row in asked.paths.to_pylist() if through in row["path"]]
         return summary.blame_section(asked, self.slowest_takes(asked, paths)[: summary.MOST_PATHS])
 
     def slowest_flows(self, asked: Question) -> list[dict[str, Any]]:
@@ -115,7 +115,7 @@ class Pages:
 
         Several may end with the same take: what is said of it once is enough.
         """
-        topics = {row["path_id"]: row["topics"] for row in asked.rows("path").to_pylist()}
+        topics = {row["path_id"]: row["topics"] for row in asked.paths.to_pylist()}
         takes: dict[int, tuple[str, str, int]] = {}
         for flow in self.slowest_flows(asked):
             names, take = topics.get(flow["path_id"]), flow["take_id"]
@@ -210,7 +210,7 @@ def _stack(_: Pages, asked: Question) -> bytes:
     words = ["export", "folded", "-o", "robot.folded"]
     # Without samples there is nothing to look for.
     if "path" in asked.params and parts[0].num_rows:
-        paths = {row["path_id"]: row["path"] for row in asked.rows("path").to_pylist()}
+        paths = {row["path_id"]: row["path"] for row in asked.paths.to_pylist()}
         number, slowest = asked.whole("path"), asked.whole("slowest")
         if number not in paths:
             raise UsageError(f"the run has no such path — {number}")

@@ -172,7 +172,7 @@ class _Maker:
         self.look_at_window()
         run = self.asked.run
         if self.through is not None:
-            self.paths_through(self.asked.rows("path"))
+            self.paths_through(self.asked.paths)
             self.notes.append(f"Its slowest paths are those with {self.through} (--through).")
         (row,) = run_page_query(self.asked.connection, "run", {"run": run.run_id}).to_pylist()
         facts = [
@@ -211,8 +211,8 @@ class _Maker:
 
     def empty_pages(self) -> list[str]:
         """Return the pages that would show nothing."""
-        needed = {"paths": "path", "graph": "row", "timeline": "row"}
-        empty = [page for page, name in needed.items() if not self.asked.rows(name).num_rows]
+        empty = [] if self.asked.paths.num_rows else ["paths"]
+        empty += [] if self.asked.rows("row").num_rows else ["graph", "timeline"]
         named = {"nodes": "info-nodes", "topics": "topics-summary"}
         empty += [page for page, name in named.items() if not len(self.named[name])]
         return [*empty, *([] if self.other else ["compare"])]
@@ -229,7 +229,7 @@ class _Maker:
 
     def keep_paths(self) -> list[int]:
         """Keep the pictures of paths; return the numbers of those kept."""
-        rows = self.asked.rows("path")
+        rows = self.asked.paths
         numbers = self.paths_through(rows)
         if self.through is not None:
             self.notes.append(
@@ -272,11 +272,11 @@ class _Maker:
             self.keep("compare", other=other.run_id, what=what)
         for name in ("path", "row"):
             self.keep(name, other)
-        rows = Question(self.asked.connection, {"run": other.run_id}).rows("path")
+        rows = Question(self.asked.connection, {"run": other.run_id}).paths
         for number in rows["path_id"].to_pylist()[:MOST_PATHS]:
             self.keep("path_share", other, path=number)
         # The page of the comparison shows the distributions of both runs for any path.
-        for number in self.asked.rows("path")["path_id"].to_pylist()[:MOST_PATHS]:
+        for number in self.asked.paths["path_id"].to_pylist()[:MOST_PATHS]:
             if number not in chosen:
                 self.keep("path_share", path=number)
 
@@ -289,12 +289,6 @@ class _Maker:
             "stretches": [],
             "count": 0,
         }
-        if not self.asked.length_ns:
-            self.keep_stretch(0, window, None)
-            self.parts["edge?"] = encode(self.asked.rows("edge", window))
-            head["stretches"] = [{"start": 0, "end": 1, "whole": True}]
-            head["notes"] = self.notes
-            return head
         rows = self.rows_on(paths) if self.through is not None else None
         (count,) = self.asked.rows("segment_count", window)["count"].to_pylist()
         head["count"] = count
@@ -332,7 +326,7 @@ class _Maker:
 
     def rows_on(self, paths: list[int]) -> list[int]:
         """Return the rows of the timeline on some paths: objects, timers, events, executors."""
-        chosen = self.asked.rows("path")
+        chosen = self.asked.paths
         chosen = chosen.filter(compute.is_in(chosen["path_id"], pa.array(paths, pa.int64())))
         publishers = {one for several in chosen["publishers"].to_pylist() for one in several}
         subscriptions = {one for several in chosen["subscriptions"].to_pylist() for one in several}

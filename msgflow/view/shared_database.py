@@ -94,9 +94,9 @@ class SharedDatabase:
         self._answers: Answers | None = None
         # A connection, which those of questions are made of; None while it is closed.
         self._base: duckdb.DuckDBPyConnection | None = None
-        # Closes it when no question was asked for a while.
-        self._idle = threading.Timer(SECONDS_UNTIL_FREE, self._free_if_idle)
+        self._is_over = False
         self._open()
+        threading.Thread(target=self._free_when_idle, daemon=True).start()
 
     def generation(self) -> str:
         """Return the generation of the database as it is now, which is opened for it."""
@@ -122,23 +122,10 @@ class SharedDatabase:
         with self._changed:
             answers, base = self._current()
             self.require(generation)
-            cursor = self._new_cursor(base)
-        started(cursor.interrupt)
-        return self._answer(answers, cursor, name, params)
-
-    def _new_cursor(self, base: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnection:
-        cursor = base.cursor()
-        self._cursors.add(cursor)
-        return cursor
-
-    def _answer(
-        self,
-        answers: Answers,
-        cursor: duckdb.DuckDBPyConnection,
-        name: str,
-        params: dict[str, Any],
-    ) -> bytes:
+            cursor = base.cursor()
+            self._cursors.add(cursor)
         try:
+            started(cursor.interrupt)
             content = self._turns.ask(lambda: answers.pages.answer(cursor, name, params))
         except (MsgflowError, duckdb.Error):
             self.require(answers.generation)  # else it was interrupted, or read another file
@@ -148,10 +135,6 @@ class SharedDatabase:
                 cursor.close()
                 self._cursors.discard(cursor)
                 self._changed.notify_all()
-                self._idle.cancel()
-                self._idle = threading.Timer(SECONDS_UNTIL_FREE, self._free_if_idle)
-                self._idle.daemon = True
-                self._idle.start()
         self.require(answers.generation)  # written in its place, it can be a part of each
         return content
 
@@ -191,22 +174,13 @@ class SharedDatabase:
         if self._answers is None or self._answers.generation != generation:
             self._forget()
             self._answers = Answers(generation, Pages())
-        ahead = [self._answers, self._new_cursor(self._base)]
-        threading.Thread(target=self._ask_ahead, args=ahead, daemon=True).start()
 
-    def _ask_ahead(self, answers: Answers, cursor: duckdb.DuckDBPyConnection) -> None:
-        """Ask for the timeline of the latest run before the page does.
-
-        The bars of a large run are counted once, which takes longer than a browser needs to open.
-        """
-        # The page asks for it too, and shows the error.
-        with suppress(MsgflowError, duckdb.Error):
-            self._answer(answers, cursor, "segments", {})
-
-    def _free_if_idle(self) -> None:
+    def _free_when_idle(self) -> None:
+        """Close the database whenever no question was answered for a while."""
         with self._changed:
-            if not self._cursors:
-                self._free()
+            while not self._is_over:
+                if not self._changed.wait(SECONDS_UNTIL_FREE) and not self._cursors:
+                    self._free()
 
     def _free(self) -> None:
         if self._base is not None:
@@ -235,7 +209,8 @@ class SharedDatabase:
         with self._changed:
             while self._cursors and time.monotonic() < end:
                 self._end_questions()
-            self._idle.cancel()
+            self._is_over = True
+            self._changed.notify_all()
             # Now and then an interrupt leaves a query of DuckDB that only the process ends.
             if not self._cursors:
                 self._free()

@@ -139,7 +139,9 @@ def test_spans_say_what_they_are_in_the_words_of_opentelemetry(
     spans = spans_of(read_file(tmp_path / "traces.json"))
     kinds = {}
     for span in spans:
-        kinds.setdefault(span["kind"], span)
+        # Of some publishers the topic is not known.
+        if span["kind"] != 4 or "messaging.destination.name" in span:
+            kinds.setdefault(span["kind"], span)
         assert {"service.name", "host.name", "process.pid", "thread.id"} <= span.keys()
     internal, server, client, producer, consumer = (kinds[kind] for kind in range(1, 6))
     assert internal["name"].startswith(("Timer(", "response "))
@@ -261,13 +263,6 @@ def test_a_message_that_was_lost_is_an_error(fresh_database: Path, tmp_path: Pat
     errors = {span["msgflow.publication_id"]: span for span in spans if span["status"][0] == 2}
     assert set(errors) == {publication for (publication,) in expected} != set()
     assert any(": overwritten" in span["status"][1] for span in errors.values())
-
-
-def test_nothing_is_left_in_the_connection(database: Database, tmp_path: Path) -> None:
-    database.export_otlp(tmp_path / "traces.json")
-    assert not database.connection.sql(
-        "SELECT 1 FROM duckdb_tables() WHERE table_name = 'otlp_span'"
-    ).fetchall()
 
 
 def test_a_collector_is_no_file(database: Database) -> None:

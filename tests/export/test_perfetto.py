@@ -42,8 +42,26 @@ class Decoded:
     slices: list[Slice] = field(default_factory=list)
     gaps: list[Slice] = field(default_factory=list)
     states: list[Slice] = field(default_factory=list)
+    events: list[Slice] = field(default_factory=list)
     arrows: set[tuple[int, int]] = field(default_factory=set)
     values: dict[int, list[tuple[int, float]]] = field(default_factory=lambda: defaultdict(list))
+
+    def place(self, track: int) -> tuple[str, ...]:
+        """Return the names of a track and of those that it lies below, the outermost first."""
+        described = self.tracks[track]
+        above = self.place(described.parent_uuid) if described.parent_uuid else ()
+        name = described.name or described.thread.thread_name or described.process.process_name
+        return (*above, name)
+
+
+def with_places(connection: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnection:
+    """Let statements read the names of the track of each thread."""
+    connection.execute(
+        "CREATE TEMP VIEW place AS SELECT thread_id, p.name || ' ' || pid || ' on ' || hostname"
+        " AS process, t.name || ' ' || tid AS thread"
+        " FROM thread AS t JOIN process AS p USING (process_id) JOIN host USING (host_id)"
+    )
+    return connection
 
 
 def decode(path: Path) -> Decoded:
@@ -57,11 +75,12 @@ def decode(path: Path) -> Decoded:
     open_slices: dict[int, list[Slice]] = defaultdict(list)
     begun: dict[int, int] = {}
     ended: dict[int, int] = {}
-    last: dict[int, int] = {}
+    categories: dict[int, str] = {}
     for packet in trace.packet:
         for table, entries in (
             (names, packet.interned_data.event_names),
             (notes, packet.interned_data.debug_annotation_names),
+            (categories, packet.interned_data.event_categories),
         ):
             table.update({entry.iid: entry.name for entry in entries})
         for entry in packet.interned_data.debug_annotation_string_values:
@@ -69,33 +88,29 @@ def decode(path: Path) -> Decoded:
         if packet.HasField("track_descriptor"):
             assert packet.track_descriptor.uuid not in decoded.tracks
             decoded.tracks[packet.track_descriptor.uuid] = packet.track_descriptor
+        # What an event refers to, it or an earlier packet brings.
+        event = packet.track_event
+        assert not event.track_uuid or event.track_uuid in decoded.tracks
+        assert not event.name_iid or event.name_iid in names
+        assert {note.name_iid for note in event.debug_annotations} <= notes.keys()
+    for packet in sorted(trace.packet, key=lambda packet: packet.timestamp):
         if not packet.HasField("track_event"):
             continue
         event = packet.track_event
-        assert event.track_uuid in decoded.tracks
-        assert packet.timestamp >= last.get(event.track_uuid, 0)
-        last[event.track_uuid] = packet.timestamp
         if event.type == event.TYPE_COUNTER:
             value = (packet.timestamp, event.double_counter_value)
             decoded.values[event.track_uuid].append(value)
-        elif {"gap", "schedule"} & set(event.categories):
-            said = {
-                note.name: note.string_value or note.int_value for note in event.debug_annotations
-            }
-            one = Slice(event.track_uuid, event.name, packet.timestamp, packet.timestamp, said, 0)
-            assert not open_slices[event.track_uuid]
-            open_slices[event.track_uuid].append(one)
-            (decoded.gaps if "gap" in event.categories else decoded.states).append(one)
         elif event.type == event.TYPE_SLICE_END:
             open_slices[event.track_uuid].pop().end = packet.timestamp
         else:
             said = {
                 notes[note.name_iid]: texts[note.string_value_iid]
                 if note.string_value_iid
-                else note.int_value
+                else getattr(note, note.WhichOneof("value"))
                 for note in event.debug_annotations
             }
             stack = open_slices[event.track_uuid]
+            (category,) = (categories[number] for number in event.category_iids)
             one = Slice(
                 event.track_uuid, names[event.name_iid], packet.timestamp, packet.timestamp, said,
                 len(stack),
@@ -106,7 +121,11 @@ def decode(path: Path) -> Decoded:
             for flow in event.terminating_flow_ids:
                 assert flow not in ended
                 ended[flow] = len(decoded.slices)
-            decoded.slices.append(one)
+            special = {
+                "gap": decoded.gaps, "schedule": decoded.states, "user_event": decoded.events,
+            }  # fmt: skip
+            assert not stack or category not in ("gap", "schedule")
+            special.get(category, decoded.slices).append(one)
             if event.type == event.TYPE_SLICE_BEGIN:
                 stack.append(one)
     assert not any(open_slices.values())
@@ -134,7 +153,7 @@ def exported(
     decoded = decode(written.path)
     counted = len(decoded.slices), len(decoded.arrows), sum(map(len, decoded.values.values()))
     assert counted == (written.slices, written.arrows, written.values)
-    return duckdb.connect(str(path), read_only=True), decoded
+    return with_places(duckdb.connect(str(path), read_only=True)), decoded
 
 
 Exported = tuple[duckdb.DuckDBPyConnection, Decoded]
@@ -148,21 +167,30 @@ def identity(one: Slice) -> tuple[str, int]:
 def test_callbacks_and_publications_are_slices_of_their_threads(exported: Exported) -> None:
     connection, decoded = exported
     found = {
-        (*identity(one), one.track, one.begin, one.end, one.name, one.notes.get("symbol"))
+        (
+            *identity(one),
+            *decoded.place(one.track),
+            one.begin,
+            one.end,
+            one.name,
+            one.notes.get("symbol"),
+        )
         for one in decoded.slices
         if identity(one)[0] in ("callback_instance", "publication", "take")
     }
     expected = connection.execute(
-        "SELECT 'callback_instance', callback_instance_id, thread_id * 8 + 2, start_ns,"
+        "SELECT 'callback_instance', callback_instance_id, process, thread, start_ns,"
         " coalesce(end_ns, start_ns), node || ' ' || label, symbol"
         " FROM callback_instance JOIN callback USING (callback_id)"
-        " JOIN callback_label USING (callback_id)"
-        " UNION ALL SELECT 'publication', publication_id, thread_id * 8 + 2, start_ns, end_ns,"
+        " JOIN callback_label USING (callback_id) JOIN place USING (thread_id)"
+        " UNION ALL SELECT 'publication', publication_id, process, thread, start_ns, end_ns,"
         " 'publish ' || coalesce(topic_name, '?'), NULL"
         " FROM publication AS b LEFT JOIN publisher USING (publisher_id)"
-        " UNION ALL SELECT 'take', take_id, thread_id * 8 + 2, taken_ns, taken_ns,"
+        " JOIN place USING (thread_id)"
+        " UNION ALL SELECT 'take', take_id, process, thread, taken_ns, taken_ns,"
         " 'take ' || coalesce(topic_name, '?'), NULL"
         " FROM take AS t LEFT JOIN subscription USING (subscription_id)"
+        " JOIN place USING (thread_id)"
     ).fetchall()
     assert len(expected) > 50
     assert found == set(expected)
@@ -216,23 +244,24 @@ def test_every_link_is_an_arrow(exported: Exported) -> None:
 def test_activities_of_executors_have_a_track_each(exported: Exported) -> None:
     connection, decoded = exported
     found = Counter(
-        (one.track, one.name, one.begin, one.end) for one in decoded.slices if one.track % 8 == 3
+        (*decoded.place(one.track), one.name, one.begin, one.end)
+        for one in decoded.slices
+        if "executor_id" in one.notes
     )
     expected = Counter(
         connection.execute(
-            "SELECT thread_id * 8 + 3, activity, start_ns, coalesce(end_ns, start_ns)"
-            " FROM executor_activity SEMI JOIN executor_state USING (thread_id)"
+            "SELECT process, thread, 'executor', activity, start_ns, coalesce(end_ns, start_ns)"
+            " FROM executor_activity JOIN place USING (thread_id)"
+            " SEMI JOIN executor_state USING (thread_id)"
         ).fetchall()
     )
     assert found == expected
-    names = {name for _, name, _, _ in found}
+    names = {name for *_, name, _, _ in found}
     assert names >= {"wait", "select", "take", "callback"}
     # Only executors of several threads block them.
     assert ("blocked" in names) == any(
         "multi" in kind for (kind,) in connection.execute("SELECT kind FROM executor").fetchall()
     )
-    for track in {track for track, *_ in found}:
-        assert decoded.tracks[track].parent_uuid == track - 1
 
 
 def test_tracks_belong_to_processes_that_are_told_apart(exported: Exported) -> None:
@@ -244,44 +273,59 @@ def test_tracks_belong_to_processes_that_are_told_apart(exported: Exported) -> N
     pids = {one.uuid: one.process.pid for one in processes}
     assert all(pids[one.parent_uuid] == one.thread.pid for one in threads)
     named = connection.execute(
-        "SELECT process_id * 8 + 1, p.name || ' ' || pid || ' on ' || hostname"
-        " FROM process AS p JOIN host USING (host_id)"
+        "SELECT p.name || ' ' || pid || ' on ' || hostname"
+        " FROM process AS p JOIN host USING (host_id) ORDER BY process_id"
     ).fetchall()
-    assert {one.uuid: one.process.process_name for one in processes} == dict(named)
+    assert [(one.process.process_name,) for one in processes] == named
 
 
 def test_counters_have_rates_and_queues(exported: Exported) -> None:
+    """Each publisher and subscription has a track of its own, in the order of their ids."""
     connection, decoded = exported
-    for (publisher,) in connection.execute("SELECT publisher_id FROM publisher").fetchall():
+    rates: list[list[Any]] = []
+    for (publisher,) in connection.execute(
+        "SELECT publisher_id FROM publisher ORDER BY 1"
+    ).fetchall():
         times = [
             time
             for (time,) in connection.execute(
                 "SELECT start_ns FROM publication WHERE publisher_id = ? ORDER BY 1", [publisher]
             ).fetchall()
         ]
-        expected = [
-            (time, pytest.approx(1e9 / (time - before)))
-            for before, time in pairwise(times)
-            if time > before
+        rates.append(
+            [
+                (time, pytest.approx(1e9 / (time - before)))
+                for before, time in pairwise(times)
+                if time > before
+            ]
+        )
+    values = {
+        unit: [
+            values
+            for track, values in sorted(decoded.values.items())
+            if decoded.tracks[track].counter.unit_name == unit
         ]
-        assert decoded.values.get(publisher * 8 + 4, []) == expected
-    waiting = [
-        value for track, values in decoded.values.items() if track % 8 == 5 for _, value in values
-    ]
+        for unit in ("Hz", "messages")
+    }
+    assert values["Hz"] == [rate for rate in rates if rate]
+    waiting = [value for queue in values["messages"] for _, value in queue]
     assert min(waiting) == 0
     assert max(waiting) >= 1
-    for track, values in decoded.values.items():
-        if track % 8 == 5:
-            ((there,),) = connection.execute(
-                "SELECT count(*) FROM link_transport AS l"
-                " JOIN publication AS b ON l.publication_id = b.publication_id"
-                " JOIN take AS t ON l.take_id = t.take_id"
-                " WHERE t.subscription_id = $id AND t.taken_ns >= b.end_ns"
-                " AND b.end_ns <= $at AND t.taken_ns > $at",
-                {"id": track // 8, "at": values[len(values) // 2][0]},
-            ).fetchall()
-            at = values[len(values) // 2][0]
-            assert [value for time, value in values if time == at][-1] == there
+    taken = (
+        "FROM link_transport AS l JOIN publication AS b ON l.publication_id = b.publication_id"
+        " JOIN take AS t ON l.take_id = t.take_id WHERE t.taken_ns >= b.end_ns"
+    )
+    subscriptions = connection.execute(
+        f"SELECT DISTINCT subscription_id {taken} AND subscription_id IS NOT NULL ORDER BY 1"
+    ).fetchall()
+    for (subscription,), queue in zip(subscriptions, values["messages"], strict=True):
+        at = queue[len(queue) // 2][0]
+        ((there,),) = connection.execute(
+            f"SELECT count(*) {taken} AND t.subscription_id = $id"
+            " AND b.end_ns <= $at AND t.taken_ns > $at",
+            {"id": subscription, "at": at},
+        ).fetchall()
+        assert [value for time, value in queue if time == at][-1] == there
 
 
 @pytest.mark.thorough
@@ -304,8 +348,8 @@ def test_gaps_are_slices_of_their_host(simulated: Callable[..., Path], tmp_path:
     pytest.importorskip("perfetto.trace_builder.proto_builder")
     path = Path(shutil.copy(simulated("pipeline", 0.1), tmp_path / "run.duckdb"))
     with duckdb.connect(str(path)) as connection:
-        ((trace, host, name, begin),) = connection.execute(
-            "SELECT trace_id, host_id, hostname, r.start_ns FROM trace JOIN host USING (host_id)"
+        ((trace, name, begin),) = connection.execute(
+            "SELECT trace_id, hostname, r.start_ns FROM trace JOIN host USING (host_id)"
             " CROSS JOIN run AS r ORDER BY trace_id LIMIT 1"
         ).fetchall()
         connection.executemany(
@@ -326,13 +370,12 @@ def test_gaps_are_slices_of_their_host(simulated: Callable[..., Path], tmp_path:
         written = database.export_perfetto(tmp_path / "run.pftrace")
         cut = database.export_perfetto(tmp_path / "cut.pftrace", start=begin + 15, end=begin + 60)
     decoded = decode(written.path)
-    track = host * 8 + 6
-    assert decoded.tracks[track].name == f"{name}: not recorded"
+    track = f"{name}: not recorded"
     first, second = "not recorded: loss, packets", "not recorded: pause"
-    assert [(one.track, one.name, one.begin - begin, one.end - begin, one.notes)
-            for one in decoded.gaps] == [
-        (track, first, 10, 50, {"lost_events": 7}), (track, second, 51, 90, {}),
-    ]  # fmt: skip
+    assert [
+        (*decoded.place(one.track), one.name, one.begin - begin, one.end - begin, one.notes)
+        for one in decoded.gaps
+    ] == [(track, first, 10, 50, {"lost_events": 7}), (track, second, 51, 90, {})]
     assert written.gaps == 2
     assert [(one.begin - begin, one.end - begin) for one in decode(cut.path).gaps] == [
         (15, 50), (51, 60),
@@ -362,11 +405,13 @@ def test_events_of_the_user_are_instants_on_their_thread(
     simulated: Callable[..., Path], tmp_path: Path
 ) -> None:
     """With their fields as arguments, each of its own type."""
-    protos = pytest.importorskip("perfetto.protos.perfetto.trace.perfetto_trace_pb2")
+    pytest.importorskip("perfetto.trace_builder.proto_builder")
     path = Path(shutil.copy(simulated("pipeline", 0.1), tmp_path / "run.duckdb"))
     fields = '{"big":18446744073709551615,"low":-5,"yes":true,"x":0.5,"text":"a","no":null,"l":[1]}'
     with duckdb.connect(str(path)) as connection:
-        ((begin,),) = connection.execute("SELECT start_ns FROM run").fetchall()
+        ((begin, tid),) = connection.execute(
+            "SELECT start_ns, tid FROM run JOIN thread USING (run_id) WHERE thread_id = 2"
+        ).fetchall()
         connection.executemany(
             "INSERT INTO store.user_event SELECT ?, 1, trace_id, process_id, thread_id, 0, ?,"
             " 'my_pkg:done', NULL, ?, false FROM store.trace JOIN store.thread"
@@ -375,13 +420,11 @@ def test_events_of_the_user_are_instants_on_their_thread(
         )
     with open_db(path) as database:
         written = database.export_perfetto(tmp_path / "run.pftrace", end=begin + 900)
-    trace = protos.Trace()
-    trace.ParseFromString(written.path.read_bytes())
-    (packet,) = (one for one in trace.packet if "user_event" in one.track_event.categories)
-    event = packet.track_event
-    assert (packet.timestamp, event.track_uuid, event.name) == (begin + 5, 2 * 8 + 2, "my_pkg:done")
-    assert event.type == event.TYPE_INSTANT
-    assert {one.name: getattr(one, one.WhichOneof("value")) for one in event.debug_annotations} == {
+    decoded = decode(written.path)
+    (event,) = decoded.events
+    assert decoded.tracks[event.track].thread.tid == tid
+    assert (event.begin, event.end, event.name) == (begin + 5, begin + 5, "my_pkg:done")
+    assert event.notes == {
         "user_event_id": 1, "big": 2**64 - 1, "low": -5, "yes": True, "x": 0.5, "text": "a",
         "no": "null", "l": "[1]",
     }  # fmt: skip
@@ -426,17 +469,73 @@ def test_states_of_threads_and_cores_have_tracks(
     with open_db(path) as database:
         written = database.export_perfetto(tmp_path / "run.pftrace")
     decoded = decode(written.path)
-    core, own = (8192 * host + 3) * 8, thread * 8 + 7
-    assert decoded.tracks[core].name == f"{name}: CPU 3"
-    assert (decoded.tracks[own].name, decoded.tracks[own].parent_uuid) == ("kernel", thread * 8 + 2)
     assert written.states == 6
-    by_track: dict[int, list[tuple[str, int, int]]] = defaultdict(list)
+    by_track: dict[str, list[tuple[str, int, int]]] = defaultdict(list)
     for one in decoded.states:
-        by_track[one.track].append((one.name, one.begin - begin, one.end - begin))
-    assert by_track[own] == [
+        *above, track = decoded.place(one.track)
+        assert bool(above) == (track == "kernel")
+        by_track[track].append((one.name, one.begin - begin, one.end - begin))
+    assert by_track.keys() == {"kernel", f"{name}: CPU 3"}
+    assert by_track["kernel"] == [
         ("running", 10, 20), ("preempted by stress 911", 20, 50), ("running", 50, 60),
         ("sleeping", 60, 90),
     ]  # fmt: skip
-    assert [(start, end) for _, start, end in by_track[core]] == [(10, 20), (50, 60)]
+    cores = by_track[f"{name}: CPU 3"]
+    assert [(start, end) for _, start, end in cores] == [(10, 20), (50, 60)]
     (asleep,) = (one for one in decoded.states if one.name == "sleeping")
     assert asleep.notes == {"cpu": 3, "priority": 120, "woken_by": "timer"}
+
+
+def test_samples_have_their_stacks(simulated: Callable[..., Path], tmp_path: Path) -> None:
+    """Each function of a file is described once, the outermost call first."""
+    protos = pytest.importorskip("perfetto.protos.perfetto.trace.perfetto_trace_pb2")
+    path = Path(shutil.copy(simulated("pipeline", 0.1), tmp_path / "run.duckdb"))
+    with duckdb.connect(str(path)) as connection:
+        ((begin, tid),) = connection.execute(
+            "SELECT start_ns, tid FROM run JOIN thread USING (run_id) WHERE thread_id = 2"
+        ).fetchall()
+        connection.execute(
+            "INSERT INTO store.stack_frame VALUES (1, 1, 'main', '/bin/robot'),"
+            " (2, 1, 'work', '/lib/a.so'), (3, 1, 'main', '/lib/a.so');"
+            "INSERT INTO store.stack VALUES (7, 1, 2, 2), (8, 1, 3, 2);"
+            "INSERT INTO store.stack_call VALUES (1, 7, 2, 2), (1, 7, 1, 1), (1, 8, 1, 1),"
+            " (1, 8, 2, 3);"
+        )
+        connection.executemany(
+            "INSERT INTO store.stack_sample BY NAME SELECT 1 AS run_id, process_id, ? AS thread_id,"
+            " tid, ? AS at_ns, ? AS cpu, ? AS stack_id FROM store.thread WHERE thread_id = 2",
+            [(2, begin + 5, 3, 7), (2, begin + 9, None, 8), (None, begin + 7, 0, 7)],
+        )
+    with open_db(path) as database:
+        written = database.export_perfetto(tmp_path / "run.pftrace")
+    trace = protos.Trace()
+    trace.ParseFromString(written.path.read_bytes())
+    tables: dict[str, dict[int, Any]] = defaultdict(dict)
+    found = []
+    for packet in trace.packet:
+        for table, entries in packet.interned_data.ListFields():
+            assert not tables[table.name].keys() & {entry.iid for entry in entries}
+            tables[table.name].update({entry.iid: entry for entry in entries})
+        if packet.HasField("perf_sample"):
+            one = packet.perf_sample
+            frames = [
+                tables["frames"][number]
+                for number in tables["callstacks"][one.callstack_iid].frame_ids
+            ]
+            stack = [
+                (
+                    tables["function_names"][frame.function_name_id].str.decode(),
+                    *(
+                        tables["mapping_paths"][number].str.decode()
+                        for number in tables["mappings"][frame.mapping_id].path_string_ids
+                    ),
+                )
+                for frame in frames
+            ]
+            found.append((packet.timestamp - begin, one.tid, one.cpu, stack))
+    assert found == [
+        (5, tid, 3, [("main", "/bin/robot"), ("work", "/lib/a.so")]),
+        (9, tid, 0, [("main", "/bin/robot"), ("main", "/lib/a.so")]),
+    ]
+    assert written.samples == 2
+    assert (len(tables["function_names"]), len(tables["mapping_paths"])) == (2, 2)

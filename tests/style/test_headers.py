@@ -223,7 +223,7 @@ def test_headers_of_what_the_program_asks_are_those_of_its_sql(
 
 
 @pytest.mark.parametrize(
-    ("name", "method"), [("comparison", Database.compare), ("flow_steps", Database.flow)]
+    ("name", "method"), [("compare", Database.compare), ("flow_steps", Database.flow)]
 )
 def test_methods_have_the_defaults_that_are_declared(
     name: str, method: Callable[..., object]

@@ -33,7 +33,7 @@ from msgflow.view.connection import timed
 from msgflow.view.page_query import Question
 from msgflow.view.pages import Pages
 from msgflow.view.server import is_local, listen, serving
-from msgflow.view.shared_database import SharedDatabase, Turns
+from msgflow.view.shared_database import Turns
 
 Serve = Callable[[Path], Served]
 
@@ -439,32 +439,3 @@ def test_other_failures_are_not_tried_again() -> None:
     with pytest.raises(QueryError):
         Turns().ask(ask)
     assert len(tries) == 1
-
-
-@pytest.mark.parametrize("statement", ["SELECT 1", "FROM nowhere", "FROM range(1000000000000)"])
-def test_the_timeline_is_counted_before_the_page_asks(
-    small_database: Path, monkeypatch: pytest.MonkeyPatch, statement: str
-) -> None:
-    """It is ended with the server, however long it takes; of what fails the page will be told."""
-    asked: list[tuple[str, dict[str, Any]]] = []
-    is_asked, is_ended = threading.Event(), threading.Event()
-
-    def answer(
-        _: Pages, connection: duckdb.DuckDBPyConnection, name: str, params: dict[str, Any]
-    ) -> bytes:
-        asked.append((name, params))
-        is_asked.set()
-        if name == "segments":
-            try:
-                connection.execute(f"SELECT count(*) FROM ({statement})").fetchall()
-            finally:
-                is_ended.set()
-        return b"next"
-
-    monkeypatch.setattr(Pages, "answer", answer)
-    shared = SharedDatabase(small_database, None)
-    assert is_asked.wait(10)
-    assert shared.answer("run", {}, None, lambda _: None) == b"next"
-    shared.close()
-    assert is_ended.wait(0)
-    assert asked == [("segments", {}), ("run", {})]

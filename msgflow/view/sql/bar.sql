@@ -21,20 +21,14 @@
 -- column: flags UTINYINT  1: lost events may hide a part; 2: an end was not seen; 4: called with
 --     an intra-process message; 8: nested in another callback instance; 16: dropped, 32: lost, neither: not known
 SELECT
-    i.run_id,
-    CASE c.kind
-        WHEN 'timer' THEN coalesce(8 * c.timer_id, 8 * c.callback_id + 5)
-        WHEN 'subscription' THEN coalesce(8 * c.subscription_id + 1, 8 * c.callback_id + 5)
-        WHEN 'service' THEN coalesce(8 * c.service_id + 2, 8 * c.callback_id + 5)
-        ELSE 8 * c.callback_id + 5
-    END AS row_key,
+    i.run_id, r.row_key,
     0::UTINYINT AS kind,
     i.callback_instance_id AS id, i.start_ns,
     coalesce(i.end_ns, i.start_ns) AS end_ns,
     (coalesce(i.is_loss_affected, false)::UTINYINT + 2 * (i.end_ns IS NULL)::UTINYINT
         + 4 * i.is_intra_process::UTINYINT + 8 * (i.depth > 1)::UTINYINT)::UTINYINT AS flags
 FROM main.callback_instance AS i
-JOIN main.callback AS c ON i.callback_id = c.callback_id
+JOIN callback_row AS r ON i.callback_id = r.callback_id
 UNION ALL
 SELECT
     run_id, coalesce(8 * publisher_id + 4, 8 * process_id + 7), 1, publication_id, start_ns, end_ns,

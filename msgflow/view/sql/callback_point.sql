@@ -7,7 +7,6 @@
 -- column: duration BIGINT [ns]  Longest duration
 -- column: callback_instance_id BIGINT  Instance with the longest duration; the first one if none was
 --     seen to end
-WITH extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width)
 SELECT
     $start_ns - $origin_ns + (i.start_ns - $start_ns) // e.width * e.width AS start_at,
     e.width AS length,

@@ -7,16 +7,11 @@
 -- column: from_id BIGINT  Its identity
 -- column: link_kind
 WITH held AS (SELECT kind, id FROM segment WHERE kind < 5),
-code AS (
-    SELECT unnest(
-        ['callback_instance', 'publication', 'take', 'request', 'response']
-    ) AS name, unnest([0, 1, 2, 3, 4])::UTINYINT AS code
-),
 coded AS (
     SELECT t.code AS to_kind, l.to_id, f.code AS from_kind, l.from_id, l.link_kind
     FROM main.flow_edge AS l
-    JOIN code AS f ON l.from_kind = f.name
-    JOIN code AS t ON l.to_kind = t.name
+    JOIN vertex_code AS f ON l.from_kind = f.name
+    JOIN vertex_code AS t ON l.to_kind = t.name
     WHERE l.run_id = $run
 )
 SELECT to_kind, to_id, from_kind, from_id, link_kind

@@ -5,8 +5,7 @@
 -- column: thread_id, start_at, length
 -- column: activity VARCHAR  'wait', 'select', 'callback' (or a take, or a service) or 'blocked'
 -- column: busy BIGINT [ns]  Time of the piece with it
-WITH extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width),
-did AS (
+WITH did AS (
     SELECT
         thread_id, start_ns, end_ns,
         CASE WHEN activity IN ('take', 'service') THEN 'callback' ELSE activity END AS activity

@@ -15,12 +15,7 @@
 -- column: from_id BIGINT  Its identity
 -- column: link_kind
 -- column: vertex_count BIGINT  Vertices of the whole flow
-WITH code AS (
-    SELECT unnest(
-        ['callback_instance', 'publication', 'take', 'request', 'response']
-    ) AS name, unnest([0, 1, 2, 3, 4])::UTINYINT AS code
-),
-reached AS MATERIALIZED (
+WITH reached AS MATERIALIZED (
     SELECT kind, id, bool_or(is_effect) AS is_effect, bool_or(NOT is_effect) AS is_cause
     FROM (
         SELECT kind, id, true AS is_effect
@@ -38,7 +33,7 @@ drawn AS MATERIALIZED (
         c.name, c.code AS kind, r.id, r.is_effect, r.is_cause, b.row_key, b.start_ns, b.end_ns,
         b.flags
     FROM reached AS r
-    JOIN code AS c ON r.kind = c.name
+    JOIN vertex_code AS c ON r.kind = c.name
     JOIN bar AS b ON c.code = b.kind AND r.id = b.id
 ),
 near AS MATERIALIZED (
@@ -62,5 +57,5 @@ SELECT
     (SELECT count(*) FROM reached) AS vertex_count
 FROM near AS n
 LEFT JOIN link AS l ON n.name = l.to_kind AND n.id = l.to_id
-LEFT JOIN code AS c ON l.from_kind = c.name
+LEFT JOIN vertex_code AS c ON l.from_kind = c.name
 ORDER BY start_at, n.kind, n.id, c.code, l.from_id, l.link_kind

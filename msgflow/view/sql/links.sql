@@ -34,12 +34,7 @@ cause AS (
         CASE l.kind WHEN 'direct' THEN 1 WHEN 'periodic_async' THEN 2 WHEN 'partial_sync' THEN 3
             WHEN 'take_adjacent' THEN 4 WHEN 'polled' THEN 5 WHEN 'queue' THEN 7 ELSE 6
             END::UTINYINT AS link_kind,
-        CASE c.kind
-            WHEN 'timer' THEN coalesce(8 * c.timer_id, 8 * c.callback_id + 5)
-            WHEN 'subscription' THEN coalesce(8 * c.subscription_id + 1, 8 * c.callback_id + 5)
-            WHEN 'service' THEN coalesce(8 * c.service_id + 2, 8 * c.callback_id + 5)
-            ELSE coalesce(8 * c.callback_id + 5, 8 * t.subscription_id + 1)
-        END AS from_row,
+        coalesce(r.row_key, 8 * t.subscription_id + 1) AS from_row,
         coalesce(8 * b.publisher_id + 4, 8 * b.process_id + 7) AS to_row,
         CASE WHEN l.kind = 'direct' THEN b.start_ns
             ELSE coalesce(i.end_ns, i.start_ns, t.taken_ns) END AS from_ns,
@@ -48,7 +43,7 @@ cause AS (
     FROM main.link_causal AS l
     JOIN main.publication AS b ON l.publication_id = b.publication_id
     LEFT JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
-    LEFT JOIN main.callback AS c ON i.callback_id = c.callback_id
+    LEFT JOIN callback_row AS r ON i.callback_id = r.callback_id
     LEFT JOIN main.take AS t ON l.take_id = t.take_id
     WHERE l.run_id = $run AND l.publication_id >= $first_publication
         AND l.is_followed

@@ -7,7 +7,6 @@
 -- column: reason
 -- column: count BIGINT  Messages, or takes
 -- column: is_internal
-WITH extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width)
 SELECT
     $start_ns - $origin_ns + (m.at_ns - $start_ns) // e.width * e.width AS start_at,
     e.width AS length, s.topic_name AS topic, m.status, m.reason,

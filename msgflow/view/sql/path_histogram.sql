@@ -9,23 +9,18 @@
 -- column: width BIGINT [ns]  Width of the bins
 -- column: count BIGINT  Flows
 WITH reached AS (
-    SELECT latency
-    FROM flow
-    WHERE run_id = $run
-        AND path_id = $path
-        AND latency IS NOT NULL
-        AND ($begin_at IS NULL OR root_at >= $begin_at)
-        AND ($end_at IS NULL OR root_at < $end_at)
-),
-extent AS (
-    SELECT min(latency) AS least, (max(latency) - min(latency)) // $bins + 1 AS width FROM reached
+    SELECT
+        latency,
+        min(latency) OVER () AS least,
+        (max(latency) OVER () - min(latency) OVER ()) // $bins + 1 AS width
+    FROM chosen_flow
+    WHERE latency IS NOT NULL
 )
 SELECT
-    (r.latency - e.least) // e.width AS bin,
-    e.least + e.width * ((r.latency - e.least) // e.width) AS low,
-    e.width,
+    (latency - least) // width AS bin,
+    least + width * bin AS low,
+    width,
     count(*) AS count
-FROM reached AS r
-CROSS JOIN extent AS e
+FROM reached
 GROUP BY ALL
 ORDER BY bin

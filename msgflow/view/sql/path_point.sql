@@ -18,11 +18,7 @@ WITH numbered AS (
         count(*) OVER () AS number,
         min(root_at) OVER () AS first_at,
         max(root_at) OVER () AS last_at
-    FROM flow
-    WHERE run_id = $run
-        AND path_id = $path
-        AND ($begin_at IS NULL OR root_at >= $begin_at)
-        AND ($end_at IS NULL OR root_at < $end_at)
+    FROM chosen_flow
 )
 SELECT
     arg_max(root_at, coalesce(latency, -1)) AS root_at,

@@ -12,12 +12,8 @@ WITH ranked AS (
         latency,
         row_number() OVER (ORDER BY latency) AS position,
         count(*) OVER () AS number
-    FROM flow
-    WHERE run_id = $run
-        AND path_id = $path
-        AND latency IS NOT NULL
-        AND ($begin_at IS NULL OR root_at >= $begin_at)
-        AND ($end_at IS NULL OR root_at < $end_at)
+    FROM chosen_flow
+    WHERE latency IS NOT NULL
 )
 SELECT max(position) / any_value(number)::DOUBLE AS share, max(latency) AS latency
 FROM ranked

@@ -9,12 +9,8 @@
 -- column: take_id BIGINT  Take at the end
 -- column: latency BIGINT [ns]  Latency
 SELECT path_id, root_at, root_kind, root_id, take_id, latency
-FROM flow
-WHERE run_id = $run
-    AND latency IS NOT NULL
-    AND ($path IS NULL OR path_id = $path)
-    AND ($begin_at IS NULL OR root_at >= $begin_at)
-    AND ($end_at IS NULL OR root_at < $end_at)
+FROM chosen_flow
+WHERE latency IS NOT NULL
 QUALIFY row_number() OVER (
     PARTITION BY path_id ORDER BY latency DESC, root_at, root_kind, root_id
 ) <= $limit

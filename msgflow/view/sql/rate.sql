@@ -10,8 +10,7 @@ WITH began AS (
     SELECT taken_ns FROM main.take WHERE run_id = $run
     UNION ALL
     SELECT start_ns FROM main.callback_instance WHERE run_id = $run
-),
-extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width)
+)
 SELECT
     $start_ns - $origin_ns + (b.at_ns - $start_ns) // e.width * e.width AS start_at,
     e.width AS length,

@@ -68,14 +68,8 @@ object AS (
         c.symbol, l.is_internal, 6
     FROM main.callback AS c
     JOIN main.callback_label AS l ON c.callback_id = l.callback_id
-    WHERE c.run_id = $run
-        AND coalesce(
-            CASE c.kind
-                WHEN 'timer' THEN c.timer_id
-                WHEN 'subscription' THEN c.subscription_id
-                WHEN 'service' THEN c.service_id
-            END
-        ) IS NULL
+    JOIN callback_row AS r ON c.callback_id = r.callback_id
+    WHERE c.run_id = $run AND r.row_key = 8 * c.callback_id + 5
     UNION ALL
     SELECT row_key, 'event', -row_key // 4, process_id, node_id, name, NULL, false, 9
     FROM event_row

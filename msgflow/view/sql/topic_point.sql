@@ -8,8 +8,7 @@
 -- column: median BIGINT [ns]  Median latency of its takes; NULL: of none it is known
 -- column: latency BIGINT [ns]  Longest latency of its takes
 -- column: take_id BIGINT  Take with the longest latency
-WITH extent AS (SELECT ($end_ns - $start_ns) // $bins + 1 AS width),
-happened AS (
+WITH happened AS (
     SELECT b.start_ns AS at_ns, false AS is_take, NULL::BIGINT AS take_id, NULL::BIGINT AS latency
     FROM main.publication AS b
     JOIN main.publisher AS p ON b.publisher_id = p.publisher_id

@@ -34,43 +34,34 @@ WITH subject AS (
         bool_or(verdict = 'B is longer') AS is_longer,
         bool_or(verdict = 'B is shorter') AS is_shorter,
         any_value(verdict) FILTER (WHERE verdict LIKE 'only in %') AS only_in,
-        any_value(a_share) AS a_share,
-        any_value(b_share) AS b_share,
-        any_value(a_count) AS a_count,
-        any_value(b_count) AS b_count,
-        any_value(a_ambiguous) AS a_ambiguous,
-        any_value(b_ambiguous) AS b_ambiguous,
         string_agg(statistic, ', ') FILTER (WHERE verdict IN ('B is longer', 'B is shorter'))
             AS differing,
         string_agg(statistic, ', ') FILTER (WHERE verdict = 'about equal') AS alike,
-        string_agg(statistic, ', ') FILTER (WHERE verdict = 'no difference shown') AS estimated,
-        any_value({a: a_ns, b: b_ns, percent: change_percent, verdict: verdict})
-            FILTER (WHERE statistic = 'median') AS median,
-        any_value({a: a_ns, b: b_ns, percent: change_percent, verdict: verdict})
-            FILTER (WHERE statistic = 'p95') AS p95,
-        any_value({a: a_ns, b: b_ns, percent: change_percent, verdict: verdict})
-            FILTER (WHERE statistic = 'max') AS longest
+        string_agg(statistic, ', ') FILTER (WHERE verdict = 'no difference shown') AS estimated
     FROM compared
     GROUP BY subject
 )
 SELECT
     CASE
-        WHEN is_longer AND is_shorter THEN 'both'
-        WHEN is_longer THEN 'longer'
-        WHEN is_shorter THEN 'shorter'
-        WHEN only_in IS NOT NULL THEN only_in
-        WHEN alike IS NOT NULL THEN 'about equal'
-        WHEN estimated IS NOT NULL THEN 'none shown'
-        ELSE median.verdict
+        WHEN s.is_longer AND s.is_shorter THEN 'both'
+        WHEN s.is_longer THEN 'longer'
+        WHEN s.is_shorter THEN 'shorter'
+        WHEN s.only_in IS NOT NULL THEN s.only_in
+        WHEN s.alike IS NOT NULL THEN 'about equal'
+        WHEN s.estimated IS NOT NULL THEN 'none shown'
+        ELSE m.verdict
     END AS change,
-    coalesce(differing, alike, estimated) AS of,
-    median.a AS a_median_ns, median.b AS b_median_ns, median.percent AS median_percent,
-    median.verdict AS median_verdict, p95.a AS a_p95_ns, p95.b AS b_p95_ns,
-    p95.percent AS p95_percent, p95.verdict AS p95_verdict, longest.a AS a_max_ns,
-    longest.b AS b_max_ns, longest.percent AS max_percent, longest.verdict AS max_verdict,
-    a_share, b_share, a_count, b_count, a_ambiguous, b_ambiguous, subject AS path
-FROM subject
+    coalesce(s.differing, s.alike, s.estimated) AS of,
+    m.a_ns AS a_median_ns, m.b_ns AS b_median_ns, m.change_percent AS median_percent,
+    m.verdict AS median_verdict, p.a_ns AS a_p95_ns, p.b_ns AS b_p95_ns,
+    p.change_percent AS p95_percent, p.verdict AS p95_verdict, l.a_ns AS a_max_ns,
+    l.b_ns AS b_max_ns, l.change_percent AS max_percent, l.verdict AS max_verdict,
+    m.a_share, m.b_share, m.a_count, m.b_count, m.a_ambiguous, m.b_ambiguous, s.subject AS path
+FROM subject AS s
+LEFT JOIN compared AS m ON s.subject = m.subject AND m.statistic = 'median'
+LEFT JOIN compared AS p ON s.subject = p.subject AND p.statistic = 'p95'
+LEFT JOIN compared AS l ON s.subject = l.subject AND l.statistic = 'max'
 ORDER BY
-    is_longer OR is_shorter OR only_in IS NOT NULL DESC,
-    abs(median.b - median.a) DESC NULLS FIRST,
-    subject
+    s.is_longer OR s.is_shorter OR s.only_in IS NOT NULL DESC,
+    abs(m.b_ns - m.a_ns) DESC NULLS FIRST,
+    s.subject

@@ -1,47 +1,52 @@
 -- description: Callback instances, publications, takes, requests and responses as spans. What
 --     caused a thing is its parent; of several causes that is the callback that it happened in, or
 --     else the latest. The others are links. A trace is a span without a parent and all that
---     descends from it. ROS's own topics and services are left out.
+--     descends from it. ROS's own topics and services are left out. A resource and a span are as
+--     OTLP/JSON has them: 64-bit integers are text there, ids are hexadecimal. Attributes are those
+--     of the conventions for messaging, remote calls, threads and code; what these have no word for
+--     begins with 'msgflow.'.
 -- grain: one row per span
 -- param: start_ns BIGINT  Begin of the window, epoch ns; does not count where keys are given
 -- param: end_ns BIGINT  End of the window, epoch ns, likewise
 -- param: keys BIGINT[] = NULL  Only these vertices, those of flows; NULL: all that begins in the
 --     window
+-- param: run_name VARCHAR  Name of the run
 -- param: identity VARCHAR = ''  What tells the run from others; ids are computed from it
--- param: at_once BIGINT = 2000  Most spans of a request
 WITH RECURSIVE place AS (
-    SELECT 'callback_instance' AS kind, i.callback_instance_id AS id, i.start_ns AS at_ns
+    SELECT
+        i.run_id, l.is_internal, 'callback_instance' AS kind, i.callback_instance_id AS id,
+        i.start_ns AS at_ns
     FROM main.callback_instance AS i
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
-    WHERE i.run_id = $run_id AND NOT l.is_internal
     UNION ALL
-    SELECT 'publication', b.publication_id, b.start_ns
+    SELECT b.run_id, p.is_internal, 'publication', b.publication_id, b.start_ns
     FROM main.publication AS b
     LEFT JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
-    WHERE b.run_id = $run_id AND NOT coalesce(p.is_internal, false)
     UNION ALL
-    SELECT 'take', t.take_id, t.taken_ns
+    SELECT t.run_id, s.is_internal, 'take', t.take_id, t.taken_ns
     FROM main.take AS t
     LEFT JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
-    WHERE t.run_id = $run_id AND NOT coalesce(s.is_internal, false)
     UNION ALL
-    SELECT 'request', q.request_id, coalesce(q.sent_ns, q.taken_ns)
-    FROM main.request AS q
+    SELECT
+        q.run_id, coalesce(c.is_internal, s.is_internal), q.kind, q.id,
+        coalesce(q.sent_ns, q.taken_ns)
+    FROM (
+        SELECT
+            run_id, 'request' AS kind, request_id AS id, sent_ns, taken_ns, client_id, service_id
+        FROM main.request
+        UNION ALL
+        SELECT run_id, 'response', response_id, sent_ns, taken_ns, client_id, service_id
+        FROM main.response
+    ) AS q
     LEFT JOIN main.client AS c ON q.client_id = c.client_id
     LEFT JOIN main.service AS s ON q.service_id = s.service_id
-    WHERE q.run_id = $run_id AND NOT coalesce(c.is_internal, s.is_internal, false)
-    UNION ALL
-    SELECT 'response', r.response_id, coalesce(r.sent_ns, r.taken_ns)
-    FROM main.response AS r
-    LEFT JOIN main.client AS c ON r.client_id = c.client_id
-    LEFT JOIN main.service AS s ON r.service_id = s.service_id
-    WHERE r.run_id = $run_id AND NOT coalesce(c.is_internal, s.is_internal, false)
 ),
 otlp_vertex AS MATERIALIZED (
     SELECT derive.vertex_key(kind, id)::BIGINT AS key, kind, id, 0 AS depth
     FROM place
-    WHERE CASE WHEN $keys IS NULL THEN at_ns >= $start_ns AND at_ns < $end_ns
-        ELSE list_contains($keys, derive.vertex_key(kind, id)) END
+    WHERE run_id = $run_id AND is_internal IS NOT true
+        AND CASE WHEN $keys IS NULL THEN at_ns >= $start_ns AND at_ns < $end_ns
+            ELSE list_contains($keys, derive.vertex_key(kind, id)) END
 ),
 described AS MATERIALIZED (
     SELECT
@@ -103,9 +108,14 @@ root AS MATERIALIZED (
 further AS (
     SELECT
         c.key,
-        list(r.trace_id ORDER BY c.place) AS trace_ids,
-        list(r.span_id ORDER BY c.place) AS span_ids,
-        list(c.link_kind ORDER BY c.place) AS causes
+        list(
+            {
+                'traceId': r.trace_id,
+                'spanId': r.span_id,
+                'attributes': [{'key': 'msgflow.link', 'value': {'stringValue': c.link_kind}}]
+            }
+            ORDER BY c.place
+        ) AS links
     FROM cause AS c
     JOIN root AS r ON c.cause_key = r.key
     WHERE c.place > 1
@@ -141,30 +151,62 @@ span AS (
     LEFT JOIN main.service AS v ON k.service_id = v.service_id
 )
 SELECT
-    (row_number() OVER (ORDER BY o.start_ns, s.root_key, s.start_ns, s.key) - 1) // $at_once
-        AS batch,
-    s.trace_id, s.span_id, p.span_id AS parent_span_id, s.kind, s.id,
-    CASE
-        WHEN s.kind = 'publication' THEN 'publish ' || s.label
-        WHEN s.kind = 'callback_instance' AND s.trigger <> 'subscription' THEN s.label
-        WHEN s.kind = 'callback_instance' THEN 'process ' || coalesce(s.topic_name, '?')
-        ELSE s.kind || ' ' || s.label
-    END AS name,
-    CASE
-        WHEN s.kind = 'publication' THEN 4
-        WHEN s.kind = 'take' OR s.trigger = 'subscription' THEN 5
-        WHEN s.kind = 'request' THEN 3
-        WHEN s.trigger = 'service' THEN 2
-        ELSE 1
-    END::INTEGER AS span_kind,
+    s.kind, s.id,
     CASE WHEN s.kind = 'take' THEN least(coalesce(u.end_ns, s.start_ns), s.start_ns)
         ELSE s.start_ns END AS from_ns,
     greatest(s.end_ns, from_ns + 1) AS to_ns,
-    CASE WHEN s.kind = 'take' THEN s.start_ns - u.end_ns END AS latency_ns,
-    s.node, h.hostname AS host, e.name AS process, e.pid, t.name AS thread, t.tid,
-    s.topic_name AS topic, s.service, s.symbol, s.link_kind AS cause, a.candidate_count,
-    f.not_delivered, w.trace_ids AS link_trace_ids, w.span_ids AS link_span_ids,
-    w.causes AS link_causes
+    CASE
+        WHEN s.kind = 'publication' THEN 'send'
+        WHEN s.kind = 'take' THEN 'receive'
+        WHEN s.kind = 'callback_instance' AND s.topic_name IS NOT NULL THEN 'process'
+    END AS operation,
+    {
+        'service.name': s.node,
+        'host.name': h.hostname,
+        'process.pid': e.pid,
+        'process.executable.name': e.name,
+        'msgflow.run': $run_name
+    } AS resource,
+    {
+        'traceId': s.trace_id,
+        'spanId': s.span_id,
+        'parentSpanId': coalesce(p.span_id, ''),
+        'name': CASE
+            WHEN s.kind = 'publication' THEN 'publish ' || s.label
+            WHEN s.kind = 'callback_instance' AND s.trigger <> 'subscription' THEN s.label
+            WHEN s.kind = 'callback_instance' THEN 'process ' || coalesce(s.topic_name, '?')
+            ELSE s.kind || ' ' || s.label
+        END,
+        'kind': CASE
+            WHEN s.kind = 'publication' THEN 4
+            WHEN s.kind = 'take' OR s.trigger = 'subscription' THEN 5
+            WHEN s.kind = 'request' THEN 3
+            WHEN s.trigger = 'service' THEN 2
+            ELSE 1
+        END,
+        'startTimeUnixNano': from_ns::VARCHAR,
+        'endTimeUnixNano': to_ns::VARCHAR,
+        'links': coalesce(w.links, []),
+        'status': {
+            'code': CASE WHEN f.not_delivered IS NULL THEN 0 ELSE 2 END,
+            'message': coalesce(f.not_delivered, '')
+        }
+    } AS span,
+    {
+        'messaging.system': CASE WHEN operation IS NOT NULL THEN 'ros2' END,
+        'messaging.destination.name': s.topic_name,
+        'messaging.operation.name': CASE operation
+            WHEN 'send' THEN 'publish' WHEN 'receive' THEN 'take' ELSE operation END,
+        'messaging.operation.type': operation,
+        'rpc.system.name': CASE WHEN s.service IS NOT NULL THEN 'ros2' END,
+        'rpc.method': s.service,
+        'code.function.name': s.symbol,
+        'thread.id': t.tid,
+        'thread.name': t.name,
+        'msgflow.link': s.link_kind,
+        'msgflow.candidate_count': a.candidate_count,
+        'msgflow.latency_ns': CASE WHEN s.kind = 'take' THEN s.start_ns - u.end_ns END
+    } AS attributes
 FROM span AS s
 JOIN described AS o ON s.root_key = o.key
 LEFT JOIN root AS p ON s.cause_key = p.key
@@ -175,4 +217,4 @@ LEFT JOIN fate AS f ON s.kind = 'publication' AND s.id = f.publication_id
 JOIN main.process AS e ON s.process_id = e.process_id
 JOIN main.host AS h ON e.host_id = h.host_id
 LEFT JOIN main.thread AS t ON s.thread_id = t.thread_id
-ORDER BY batch, o.start_ns, s.root_key, s.start_ns, s.key
+ORDER BY o.start_ns, s.root_key, s.start_ns, s.key

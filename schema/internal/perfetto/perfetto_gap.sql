@@ -9,31 +9,33 @@ WITH gap AS (
     JOIN main.trace AS t ON g.trace_id = t.trace_id
     WHERE g.run_id = $run_id AND g.start_ns < $end_ns AND g.end_ns >= $start_ns
 ),
+-- A gap belongs to the last one before it that touches none before.
 begun AS (
     SELECT
-        host_id, kind, event_count, start_ns, end_ns,
-        coalesce(start_ns > max(end_ns) OVER (
+        *,
+        CASE WHEN start_ns <= max(end_ns) OVER (
             PARTITION BY host_id ORDER BY start_ns, end_ns
             ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
-        ), true) AS is_first
+        ) THEN NULL ELSE start_ns END AS first_ns
     FROM gap
 ),
-numbered AS (
+joined AS (
     SELECT
-        host_id, kind, event_count, start_ns, end_ns,
-        sum(is_first::BIGINT) OVER (
+        *,
+        max(first_ns) OVER (
             PARTITION BY host_id ORDER BY start_ns, end_ns ROWS UNBOUNDED PRECEDING
-        ) AS island
+        ) AS joined_ns
     FROM begun
 )
 SELECT
-    n.host_id * 8 + 6 AS track,
-    h.hostname || ': not recorded' AS track_name,
-    'not recorded: ' || string_agg(DISTINCT n.kind, ', ' ORDER BY n.kind) AS name,
-    min(n.start_ns) AS start_ns,
-    max(n.end_ns) AS end_ns,
-    sum(n.event_count)::BIGINT AS event_count
-FROM numbered AS n
-JOIN main.host AS h ON n.host_id = h.host_id
-GROUP BY n.host_id, h.hostname, n.island
-ORDER BY track, start_ns
+    j.host_id,
+    h.hostname || ': not recorded' AS track,
+    'gap' AS category,
+    'not recorded: ' || string_agg(DISTINCT j.kind, ', ' ORDER BY j.kind) AS name,
+    j.joined_ns AS start_ns,
+    max(j.end_ns) AS end_ns,
+    sum(j.event_count)::BIGINT AS lost_events
+FROM joined AS j
+JOIN main.host AS h ON j.host_id = h.host_id
+GROUP BY j.host_id, h.hostname, j.joined_ns
+ORDER BY j.host_id, start_ns

@@ -1,138 +1,128 @@
--- kind: inline
--- description: Begins and ends of slices of threads and of executors, in the order of each track,
---     with the links between them. A request whose response a callback waited for lasts until then.
---     A link begins at the last and ends at the first moment of a
---     request or response that was traced.
--- grain: one row per begin and end of a slice, and per moment
-WITH waited AS MATERIALIZED (
-    SELECT request_id, service_id, returned_ns, queue_ns, served_ns
-    FROM main.waited_call
-    WHERE run_id = $run_id
-),
-slice AS MATERIALIZED (
+-- description: What threads did, and the links between: an arrow leaves the last and reaches the
+--     first slice of a request or response. A request whose response a callback waited for lasts
+--     until then.
+-- grain: one row per slice
+WITH call AS MATERIALIZED (
     SELECT
-        i.thread_id * 8 + 2 AS track, i.start_ns, coalesce(i.end_ns, i.start_ns) AS end_ns,
-        0 AS code, i.callback_id AS object_id, i.callback_instance_id AS id,
-        CASE WHEN c.symbol IS NOT NULL THEN c.callback_id END AS symbol_id
+        q.run_id, 'request' AS kind, q.request_id AS id,
+        q.sender_thread_id, q.sent_ns, q.receiver_thread_id, q.taken_ns,
+        coalesce(
+            'service ' || w.service_name || ' (' || coalesce(w.server, '?') || ')',
+            'request ' || coalesce(c.service_name, '?')
+        ) AS sent_name,
+        'take request ' || coalesce(s.service_name, '?') AS taken_name,
+        w.returned_ns, w.queue_ns, w.served_ns
+    FROM main.request AS q
+    LEFT JOIN main.waited_call AS w ON q.request_id = w.request_id
+    LEFT JOIN main.client AS c ON q.client_id = c.client_id
+    LEFT JOIN main.service AS s ON q.service_id = s.service_id
+    WHERE q.run_id = $run_id
+    UNION ALL
+    SELECT
+        r.run_id, 'response', r.response_id,
+        r.sender_thread_id, r.sent_ns, r.receiver_thread_id, r.taken_ns,
+        'respond ' || coalesce(s.service_name, '?'),
+        'take response ' || coalesce(c.service_name, '?'),
+        NULL, NULL, NULL
+    FROM main.response AS r
+    LEFT JOIN main.client AS c ON r.client_id = c.client_id
+    LEFT JOIN main.service AS s ON r.service_id = s.service_id
+    WHERE r.run_id = $run_id
+),
+slice AS (
+    SELECT
+        i.run_id, i.thread_id, i.start_ns, i.end_ns,
+        'callback' AS category, 'callback_instance' AS kind, i.callback_instance_id AS id,
+        l.node || ' ' || l.label AS name,
+        c.symbol,
+        true AS is_first, true AS is_last
     FROM main.callback_instance AS i
     JOIN main.callback AS c ON i.callback_id = c.callback_id
-    WHERE i.run_id = $run_id AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
-    UNION ALL
-    SELECT thread_id * 8 + 2, start_ns, coalesce(end_ns, start_ns), 1,
-        coalesce(publisher_id, 0), publication_id, NULL
-    FROM main.publication
-    WHERE run_id = $run_id AND start_ns >= $start_ns AND start_ns < $end_ns
-    UNION ALL
-    SELECT thread_id * 8 + 2, taken_ns, taken_ns, 2, coalesce(subscription_id, 0), take_id, NULL
-    FROM main.take
-    WHERE run_id = $run_id AND taken_ns >= $start_ns AND taken_ns < $end_ns
-        AND method <> 'callback_only'
-    UNION ALL
+    JOIN main.callback_label AS l ON i.callback_id = l.callback_id
+    UNION ALL BY NAME
     SELECT
-        q.sender_thread_id * 8 + 2, q.sent_ns, coalesce(w.returned_ns, q.sent_ns), 3,
-        coalesce(
-            3 * w.service_id + 1,
-            3 * coalesce(q.client_id, 0) + 2 * (w.request_id IS NOT NULL)::INTEGER
-        ),
-        q.request_id, NULL
-    FROM main.request AS q
-    LEFT JOIN waited AS w ON q.request_id = w.request_id
-    WHERE q.run_id = $run_id AND q.sent_ns >= $start_ns AND q.sent_ns < $end_ns
-        AND q.sender_thread_id IS NOT NULL
-    UNION ALL
-    SELECT receiver_thread_id * 8 + 2, taken_ns, taken_ns, 4, coalesce(service_id, 0), request_id,
-        NULL
-    FROM main.request
-    WHERE run_id = $run_id AND taken_ns >= $start_ns AND taken_ns < $end_ns
-        AND receiver_thread_id IS NOT NULL
-    UNION ALL
-    SELECT sender_thread_id * 8 + 2, sent_ns, sent_ns, 5, coalesce(service_id, 0), response_id,
-        NULL
-    FROM main.response
-    WHERE run_id = $run_id AND sent_ns >= $start_ns AND sent_ns < $end_ns
-        AND sender_thread_id IS NOT NULL
-    UNION ALL
-    SELECT receiver_thread_id * 8 + 2, taken_ns, taken_ns, 6, coalesce(client_id, 0), response_id,
-        NULL
-    FROM main.response
-    WHERE run_id = $run_id AND taken_ns >= $start_ns AND taken_ns < $end_ns
-        AND receiver_thread_id IS NOT NULL
+        b.run_id, b.thread_id, b.start_ns, b.end_ns,
+        'publication' AS category, 'publication' AS kind, b.publication_id AS id,
+        'publish ' || coalesce(p.topic_name, '?') AS name,
+        true AS is_first, true AS is_last
+    FROM main.publication AS b
+    LEFT JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
+    UNION ALL BY NAME
+    SELECT
+        t.run_id, t.thread_id, t.taken_ns AS start_ns,
+        'take' AS category, 'take' AS kind, t.take_id AS id,
+        'take ' || coalesce(s.topic_name, '?') AS name,
+        true AS is_first, true AS is_last
+    FROM main.take AS t
+    LEFT JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
+    WHERE t.method <> 'callback_only'
+    UNION ALL BY NAME
+    SELECT
+        run_id, sender_thread_id AS thread_id, sent_ns AS start_ns, returned_ns AS end_ns,
+        'service' AS category, kind, id,
+        sent_name AS name,
+        queue_ns, served_ns,
+        true AS is_first, taken_ns IS NULL AS is_last
+    FROM call
+    UNION ALL BY NAME
+    SELECT
+        run_id, receiver_thread_id AS thread_id, taken_ns AS start_ns,
+        'service' AS category, kind, id,
+        taken_name AS name,
+        sent_ns IS NULL AS is_first, true AS is_last
+    FROM call
+),
+drawn AS MATERIALIZED (
+    SELECT * REPLACE (coalesce(end_ns, start_ns) AS end_ns)
+    FROM slice
+    WHERE run_id = $run_id AND start_ns >= $start_ns AND start_ns < $end_ns
+        AND thread_id IS NOT NULL
 ),
 link AS (
-    SELECT
-        CASE l.from_kind WHEN 'callback_instance' THEN 0 WHEN 'publication' THEN 1
-            WHEN 'take' THEN 2 WHEN 'request' THEN CASE WHEN q.taken_ns IS NULL THEN 3 ELSE 4 END
-            ELSE CASE WHEN a.taken_ns IS NULL THEN 5 ELSE 6 END
-        END AS from_code,
-        l.from_id,
-        CASE l.to_kind WHEN 'callback_instance' THEN 0 WHEN 'publication' THEN 1
-            WHEN 'take' THEN 2 WHEN 'request' THEN CASE WHEN o.sent_ns IS NULL THEN 4 ELSE 3 END
-            ELSE CASE WHEN r.sent_ns IS NULL THEN 6 ELSE 5 END
-        END AS to_code,
-        l.to_id, l.link_kind
-    FROM main.flow_edge AS l
-    LEFT JOIN main.request AS q ON l.from_kind = 'request' AND l.from_id = q.request_id
-    LEFT JOIN main.response AS a ON l.from_kind = 'response' AND l.from_id = a.response_id
-    LEFT JOIN main.request AS o ON l.to_kind = 'request' AND l.to_id = o.request_id
-    LEFT JOIN main.response AS r ON l.to_kind = 'response' AND l.to_id = r.response_id
-    WHERE l.run_id = $run_id
+    SELECT from_kind, from_id, to_kind, to_id, link_kind, false AS is_within
+    FROM derive.flow_link
+    WHERE run_id = $run_id
     UNION ALL
-    SELECT 3, request_id, 4, request_id, 'transport'
-    FROM main.request
-    WHERE run_id = $run_id AND sent_ns IS NOT NULL AND taken_ns IS NOT NULL
-    UNION ALL
-    SELECT 5, response_id, 6, response_id, 'transport'
-    FROM main.response
-    WHERE run_id = $run_id AND sent_ns IS NOT NULL AND taken_ns IS NOT NULL
+    SELECT kind, id, kind, id, 'transport', true FROM call
 ),
--- Arrows with both ends drawn.
 arrow AS MATERIALIZED (
-    SELECT l.from_code, l.from_id, l.to_code, l.to_id,
-        hash(l.from_code, l.from_id, l.to_code, l.to_id, l.link_kind) AS arrow_id
+    SELECT
+        f.kind AS from_kind, f.id AS from_id, f.is_first AS is_from_first,
+        t.kind AS to_kind, t.id AS to_id, t.is_first AS is_to_first,
+        hash(l.from_kind, l.from_id, l.to_kind, l.to_id, l.link_kind) AS arrow
     FROM link AS l
-    SEMI JOIN slice AS f ON l.from_code = f.code AND l.from_id = f.id
-    SEMI JOIN slice AS t ON l.to_code = t.code AND l.to_id = t.id
+    JOIN drawn AS f
+        ON l.from_kind = f.kind AND l.from_id = f.id AND l.is_within <> f.is_last
+    JOIN drawn AS t
+        ON l.to_kind = t.kind AND l.to_id = t.id AND l.is_within <> t.is_first
 ),
 outgoing AS (
-    SELECT from_code AS code, from_id AS id, list(arrow_id ORDER BY arrow_id) AS arrows
+    SELECT from_kind AS kind, from_id AS id, is_from_first AS is_first, list(arrow ORDER BY arrow) AS arrows
     FROM arrow
-    GROUP BY from_code, from_id
+    GROUP BY ALL
 ),
 incoming AS (
-    SELECT to_code AS code, to_id AS id, list(arrow_id ORDER BY arrow_id) AS arrows
+    SELECT to_kind AS kind, to_id AS id, is_to_first AS is_first, list(arrow ORDER BY arrow) AS arrows
     FROM arrow
-    GROUP BY to_code, to_id
-),
-drawn AS NOT MATERIALIZED (
-    SELECT track, start_ns, end_ns, code, object_id, id, symbol_id FROM slice
-    UNION ALL
-    SELECT
-        thread_id * 8 + 3, start_ns, coalesce(end_ns, start_ns), 7,
-        list_position(['wait', 'select', 'take', 'callback', 'service', 'blocked'], activity),
-        executor_id, NULL
-    FROM main.executor_activity
-    WHERE run_id = $run_id AND start_ns >= $start_ns AND start_ns < $end_ns
-        AND thread_id IN (SELECT thread_id FROM main.executor_state WHERE run_id = $run_id)
-),
--- What ends at a moment before what begins there, the inner before the outer, and what begins the
--- other way round.
-event AS (
-    SELECT
-        track, start_ns AS at_ns, CASE WHEN end_ns > start_ns THEN 1 ELSE 2 END AS rank,
-        end_ns AS far_ns, code, object_id, id, symbol_id
-    FROM drawn
-    UNION ALL
-    SELECT track, end_ns, 0, start_ns, code, NULL, id, NULL FROM drawn WHERE end_ns > start_ns
+    GROUP BY ALL
 )
 SELECT
-    e.track, e.at_ns, e.rank, e.object_id * 8 + e.code + 1 AS name, e.code, e.id,
-    e.symbol_id, a.candidate_count, w.queue_ns, w.served_ns, o.arrows AS outgoing,
+    d.thread_id, d.start_ns, d.end_ns, d.category, d.name, d.kind, d.id,
+    d.symbol, a.candidate_count, d.queue_ns, d.served_ns,
+    o.arrows AS outgoing,
     i.arrows AS incoming
-FROM event AS e
-LEFT JOIN outgoing AS o ON e.rank > 0 AND e.code = o.code AND e.id = o.id
-LEFT JOIN incoming AS i ON e.rank > 0 AND e.code = i.code AND e.id = i.id
-LEFT JOIN waited AS w ON e.rank > 0 AND e.code = 3 AND e.id = w.request_id
+FROM drawn AS d
+LEFT JOIN outgoing AS o ON d.kind = o.kind AND d.id = o.id AND d.is_first = o.is_first
+LEFT JOIN incoming AS i ON d.kind = i.kind AND d.id = i.id AND d.is_first = i.is_first
 LEFT JOIN derive.ambiguous_effect AS a
-    ON e.rank > 0 AND e.id = a.id AND a.run_id = $run_id
-    AND e.code = CASE a.kind WHEN 'take' THEN 2 ELSE 1 END
-ORDER BY e.track, e.at_ns, e.rank, e.far_ns DESC, e.code, e.id
+    ON d.kind = a.kind AND d.id = a.id AND a.run_id = $run_id
+UNION ALL BY NAME
+SELECT
+    thread_id, start_ns,
+    coalesce(end_ns, start_ns) AS end_ns,
+    'executor' AS track, 'executor' AS category, activity AS name,
+    'executor' AS kind, executor_id AS id
+FROM main.executor_activity
+WHERE run_id = $run_id AND start_ns >= $start_ns AND start_ns < $end_ns
+    AND thread_id IN (SELECT thread_id FROM main.executor_state WHERE run_id = $run_id)
+ORDER BY thread_id, start_ns, end_ns DESC, kind, id

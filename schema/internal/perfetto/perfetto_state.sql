@@ -1,12 +1,12 @@
--- description: States of threads, as the kernel recorded them, and what of that ran on which core.
---     Slices of a track are disjoint.
+-- description: States of threads, as the kernel recorded them, and what of that ran on which core:
+--     one thread at a time.
 -- grain: one row per state of a thread, and per stretch in which a thread ran on a core
 WITH state AS MATERIALIZED (
     SELECT
         s.thread_id, s.state, s.start_ns, s.end_ns, s.cpu, s.priority, s.waker_kind, p.host_id,
         h.hostname,
         printf('%s %d', l.label, t.tid) AS thread,
-        printf('%s %d', coalesce(bl.label, o.name, '?'), coalesce(b.tid, o.tid)) AS who
+        printf('%s %d', coalesce(bl.label, o.name, '?'), coalesce(b.tid, o.tid)) AS other
     FROM main.thread_state AS s
     JOIN main.thread AS t ON s.thread_id = t.thread_id
     JOIN main.process AS p ON t.process_id = p.process_id
@@ -20,19 +20,20 @@ WITH state AS MATERIALIZED (
     WHERE s.run_id = $run_id AND s.start_ns >= $start_ns AND s.start_ns < $end_ns
 )
 SELECT
-    thread_id * 8 + 7 AS track,
-    thread_id * 8 + 2 AS parent,
-    'kernel' AS track_name,
-    CASE WHEN state = 'preempted' THEN concat_ws(' by ', state, who) ELSE state END AS name,
+    NULL AS host_id, thread_id,
+    'kernel' AS track, 'schedule' AS category,
+    CASE WHEN state = 'preempted' THEN concat_ws(' by ', state, other) ELSE state END AS name,
     start_ns, end_ns, cpu, priority,
-    CASE WHEN waker_kind = 'thread' THEN who ELSE waker_kind END AS woken_by
+    CASE WHEN waker_kind = 'thread' THEN other ELSE waker_kind END AS woken_by
 FROM state
 UNION ALL
--- Linux has at most 8192 CPUs.
 SELECT
-    (8192 * host_id + cpu) * 8, NULL, printf('%s: CPU %d', hostname, cpu), thread, start_ns,
-    least(end_ns, lead(start_ns) OVER (PARTITION BY host_id, cpu ORDER BY start_ns)), cpu, priority,
-    NULL
+    host_id, NULL,
+    printf('%s: CPU %d', hostname, cpu), 'schedule',
+    thread,
+    start_ns,
+    least(end_ns, lead(start_ns) OVER (PARTITION BY host_id, cpu ORDER BY start_ns)),
+    cpu, priority, NULL
 FROM state
 WHERE state = 'running' AND cpu IS NOT NULL
-ORDER BY track, start_ns
+ORDER BY start_ns, thread_id, host_id, cpu

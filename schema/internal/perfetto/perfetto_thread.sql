@@ -1,15 +1,7 @@
--- kind: inline
--- description: The tracks of threads, and of what their executors did on them.
+-- description: Threads of processes.
 -- grain: one row per thread
-SELECT
-    t.thread_id * 8 + 2 AS track,
-    p.track AS parent, p.pid,
-    CASE WHEN count(*) OVER (PARTITION BY t.tid) = 1 THEN t.tid
-        ELSE 1500000000 + row_number() OVER (ORDER BY t.thread_id) END AS tid,
-    printf('%s %d', coalesce(t.name, '?'), t.tid) AS name,
-    t.thread_id IN (SELECT thread_id FROM main.executor_state WHERE run_id = $run_id) AS has_states,
-    t.thread_id * 8 + 3 AS state_track
+SELECT t.thread_id, t.process_id, p.pid, t.tid, printf('%s %d', coalesce(t.name, '?'), t.tid) AS name
 FROM main.thread AS t
-JOIN perfetto_process AS p ON t.process_id * 8 + 1 = p.track
+JOIN main.process AS p ON t.process_id = p.process_id
 WHERE t.run_id = $run_id
-ORDER BY track
+ORDER BY t.thread_id

@@ -1,5 +1,5 @@
 -- description: What a good run met, and a little more, as requirements. It reads the rows of named
---     queries, each a table of its name.
+--     queries, each a table of its name, in the order of `place`.
 -- grain: one row per thing with requirements
 -- reads: action_latency, e2e_latency, scheduling, scheduling_wakeup, service_latency, timers,
 --     topics_rate
@@ -9,8 +9,7 @@ WITH path AS (
     SELECT
         steps[2] AS first, steps[-2] AS last, min(place) AS place, max(p99_ns) AS slow_ns,
         min(reached / (roots - not_connected - cut_by_recording)) AS share
-    FROM (SELECT *, row_number() OVER () AS place, string_split(path, ' → ') AS steps
-          FROM e2e_latency)
+    FROM (SELECT *, string_split(path, ' → ') AS steps FROM e2e_latency)
     -- A service that is called has brackets.
     WHERE steps[2] LIKE '/%' AND steps[-2] LIKE '/%'
     GROUP BY ALL
@@ -22,7 +21,7 @@ timer AS (
         -- The time that an operating system may need to wake a thread.
         greatest(1e6, max(lateness_p99_ns)) AS late_ns,
         bool_and(lateness_p99_ns IS NOT NULL) AS is_late_known
-    FROM (SELECT *, row_number() OVER () AS place FROM timers)
+    FROM timers
     GROUP BY ALL
     HAVING min(count) >= $least_values
 ),
@@ -32,7 +31,7 @@ callback AS (
         1 + floor(
             100 * (1 + $margin) * coalesce(max(preempted_ns / nullif(total_ns, 0)), 0)
         )::BIGINT AS most_percent
-    FROM (SELECT *, row_number() OVER () AS place FROM scheduling)
+    FROM scheduling
     WHERE node LIKE '/%'
     GROUP BY ALL
     HAVING min(count) >= $least_values
@@ -40,7 +39,7 @@ callback AS (
 topic AS (
     SELECT
         topic_name, publisher, min(place) AS place, any_value(rate_hz) AS rate_hz
-    FROM (SELECT *, row_number() OVER () AS place FROM topics_rate)
+    FROM topics_rate
     WHERE topic_name IS NOT NULL AND publisher LIKE '/%'
     GROUP BY ALL
     -- A topic that pauses or comes in bursts has no rate.
@@ -53,13 +52,11 @@ called AS (
         if(kind = 'service', 'round_trip', 'goal') AS metric
     FROM (
         SELECT
-            'service' AS kind, service_name AS name, row_number() OVER () AS place,
-            answered AS samples, round_trip_p99_ns AS slow_ns
+            'service' AS kind, service_name AS name, place, answered AS samples,
+            round_trip_p99_ns AS slow_ns
         FROM service_latency
         UNION ALL
-        SELECT
-            'action', action_name, row_number() OVER () AS place, finished, result_p99_ns
-        FROM action_latency
+        SELECT 'action', action_name, place, finished, result_p99_ns FROM action_latency
     )
     -- The services of an action say no more than the action.
     WHERE NOT contains(name, '/_action/')
@@ -71,7 +68,7 @@ process AS (
         nodes, process, min(place) AS place, max(p99_ns) AS slow_ns,
         -- Without nodes it has its id, which is another one in the next run.
         if(nodes LIKE '/%', nodes, process) AS name
-    FROM (SELECT *, row_number() OVER () AS place FROM scheduling_wakeup)
+    FROM scheduling_wakeup
     GROUP BY ALL
     HAVING max(count) >= $least_values
 ),
