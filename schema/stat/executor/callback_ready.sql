@@ -4,9 +4,9 @@
 --     found it (unless that callback ran in between: then more of its input may have waited). At
 --     the latest when the executor last learned what is ready, before it picked this callback. In
 --     an events executor, which serves what came first first, also not after what its own thread
---     published and it ran then or later. With that wait of the executor, the end of the wait
---     before it, the time spent waiting before, and the moment at which its thread began to look
---     for work and picked it (the start, with one thread or where that does not show).
+--     published and it ran then or later. With the begin of that wait of the executor, the end
+--     of the wait before it, and the moment at which its thread began to look for work and picked
+--     it (the start, with one thread or where that does not show).
 -- grain: one row per callback instance that is not nested in another
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
 --     instances that began after the last of these moments are left out (where all are NULL: none)
@@ -50,7 +50,7 @@ picked AS (
 ),
 polled AS (
     SELECT
-        p.*, w.start_ns AS wait_start_ns, w.end_ns AS wait_end_ns, w.before_ns AS wait_before_ns,
+        p.*, w.start_ns AS wait_start_ns, w.end_ns AS wait_end_ns,
         w.previous_end_ns AS previous_wait_end_ns, w.asleep_ns
     FROM picked AS p
     ASOF LEFT JOIN derive.executor_poll('sized') AS w
@@ -103,6 +103,6 @@ SELECT
         AS latest_ns,
     start_ns, thread_count,
     coalesce(picked_ns, start_ns) AS picked_ns,
-    wait_start_ns, wait_end_ns, wait_before_ns, previous_wait_end_ns,
+    wait_start_ns, previous_wait_end_ns,
     coalesce(resumed_ns > coalesce(earliest_ns, polled_ns), false) AS is_loss_affected
 FROM bounded
