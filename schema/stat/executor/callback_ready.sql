@@ -36,16 +36,15 @@ release AS (
 -- A thread among several picks what it will run when it begins to look, not when it runs it:
 -- another thread may have gone to wait in the meantime.
 picked AS (
-    SELECT *, start_ns AS picked_ns FROM release WHERE thread_count = 1
-    UNION ALL
-    SELECT r.*, s.start_ns
-    FROM (SELECT * FROM release WHERE has_teams AND thread_count > 1) AS r
+    SELECT
+        r.*, CASE WHEN r.thread_count = 1 THEN r.start_ns ELSE s.start_ns END AS picked_ns
+    FROM release AS r
     ASOF LEFT JOIN (
         SELECT e.thread_id, e.start_ns
         FROM store.executor_state AS e
         JOIN store.executor_thread AS x ON e.thread_id = x.thread_id
         JOIN sized AS z ON x.executor_id = z.executor_id
-        WHERE e.state = 'process' AND z.thread_count > 1
+        WHERE has_teams AND e.state = 'process' AND z.thread_count > 1
     ) AS s ON r.thread_id = s.thread_id AND r.start_ns >= s.start_ns
 ),
 polled AS (
@@ -60,11 +59,6 @@ broken AS (
     SELECT x.executor_id, b.resumed_ns
     FROM store.thread_break AS b
     JOIN store.executor_thread AS x ON b.thread_id = x.thread_id
-),
-resumed AS (
-    SELECT r.callback_instance_id, b.resumed_ns
-    FROM (SELECT * FROM release SEMI JOIN broken USING (executor_id)) AS r
-    ASOF JOIN broken AS b ON r.executor_id = b.executor_id AND r.start_ns >= b.resumed_ns
 ),
 known AS (
     SELECT
@@ -81,7 +75,7 @@ known AS (
                 THEN p.asleep_ns END
         ) AS not_ready_ns
     FROM polled AS p
-    LEFT JOIN resumed AS b ON p.callback_instance_id = b.callback_instance_id
+    ASOF LEFT JOIN broken AS b ON p.executor_id = b.executor_id AND p.start_ns >= b.resumed_ns
 ),
 bounded AS (
     SELECT
