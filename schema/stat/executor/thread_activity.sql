@@ -173,4 +173,4 @@ FROM classified
 WHERE activity IS NOT NULL AND (end_ns > start_ns OR end_ns IS NULL)
 UNION ALL
 SELECT run_id, executor_id, thread_id, activity, start_ns, end_ns, NULL
-FROM derive.queue_activity(runs, window_start_ns, window_end_ns)
+FROM derive.queue_activity(runs)
