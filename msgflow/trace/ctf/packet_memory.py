@@ -45,8 +45,7 @@ def room_for(size: int) -> int:
 class Loader:
     """Keeps the packets of the current batch in memory.
 
-    Packets that the next batch needs, too, are copied to its memory. Buffers of memories that are
-    no longer in use are used again.
+    Packets that the next batch needs, too, are copied to its memory.
     """
 
     def __init__(self) -> None:
