@@ -1,5 +1,5 @@
--- description: Stretches of time in which enough runs of a group were under way at once. `before_ns`
---     is the sum of the earlier stretches of the group.
+-- description: Stretches of time in which enough runs of a group were under way at once.
+--     `before_ns` is the sum of the earlier stretches of the group.
 -- grain: one row per stretch in which their number does not change
 -- param: runs VARCHAR  Name of rows of executor_id, callback_id (NULL: of all callbacks), start_ns,
 --     end_ns, enough: how many have to run at once

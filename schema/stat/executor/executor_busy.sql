@@ -1,5 +1,5 @@
--- description: Stretches of time in which no thread of an executor was free to start a callback: all
---     of them ran one. `before_ns` is the sum of the earlier stretches.
+-- description: Stretches of time in which no thread of an executor was free to start a callback:
+--     all of them ran one. `before_ns` is the sum of the earlier stretches.
 -- grain: one row per such stretch
 WITH run AS (
     SELECT
