@@ -1,14 +1,14 @@
--- description: Stretches of time in which enough runs of a group were under way at once.
+-- description: Stretches of time in which enough callbacks of a group ran at once.
 --     `before_ns` is the sum of the earlier stretches of the group.
 -- grain: one row per stretch in which their number does not change
--- param: runs VARCHAR  Name of rows of executor_id, callback_id (NULL: of all callbacks), start_ns,
+-- param: callbacks VARCHAR  Name of rows of executor_id, callback_id (NULL: of all), start_ns,
 --     end_ns, enough: how many have to run at once
-CREATE OR REPLACE MACRO derive.concurrency(runs) AS TABLE
+CREATE OR REPLACE MACRO derive.concurrency(callbacks) AS TABLE
 WITH edge AS (
     SELECT
         executor_id, callback_id, enough,
         unnest([start_ns, end_ns]) AS at_ns, unnest([1, -1]) AS step
-    FROM query_table(runs)
+    FROM query_table(callbacks)
 ),
 level AS (
     SELECT
