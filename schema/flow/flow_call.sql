@@ -9,15 +9,11 @@
 -- up.
 CREATE OR REPLACE MACRO derive.flow_call(only_run) AS TABLE
 WITH caller AS (
-    SELECT i.callback_instance_id, i.take_id
+    SELECT i.callback_instance_id, i.take_id, t.subscription_id
     FROM store.callback_instance AS i
     SEMI JOIN derive.certain_request AS l ON i.callback_instance_id = l.callback_instance_id
-    WHERE i.run_id = only_run
-),
-taking AS (
-    SELECT i.callback_instance_id, i.take_id, t.subscription_id
-    FROM caller AS i
     LEFT JOIN store.take AS t ON i.take_id = t.take_id
+    WHERE i.run_id = only_run
 ),
 published AS (
     SELECT
@@ -40,8 +36,8 @@ published AS (
 )
 SELECT
     p.run_id, p.publication_id, p.publisher_id, p.kind, p.callback_instance_id,
-    p.taken_request_id, p.taken_response_id, c.caller_id, c.route, t.take_id, t.subscription_id
+    p.taken_request_id, p.taken_response_id, c.caller_id, c.route, i.take_id, i.subscription_id
 FROM derive.flow_caller AS c
-JOIN taking AS t ON c.caller_id = t.callback_instance_id
+JOIN caller AS i ON c.caller_id = i.callback_instance_id
 JOIN published AS p ON c.called_key = p.called_key
 WHERE c.run_id = only_run

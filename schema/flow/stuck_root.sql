@@ -22,17 +22,13 @@ CREATE OR REPLACE MACRO derive.stuck_root(
 -- How far each root came: its last take on the way, by depth, then time.
 WITH progress AS (
     SELECT
-        m.path_id, m.root_key,
-        max(
-            CASE WHEN r.take_id IS NOT NULL THEN
-                struct_pack(depth := l.depth, taken_ns := t.taken_ns, take_id := r.take_id)
-            END
-        ) AS last_take
-    FROM query_table(missing) AS m
-    JOIN query_table(lineages) AS l ON m.path_id = l.path_id
-    LEFT JOIN query_table(reached) AS r ON l.prefix_id = r.path_id AND m.root_key = r.root_key
-    LEFT JOIN store.take AS t ON r.take_id = t.take_id
-    GROUP BY m.path_id, m.root_key
+        l.path_id, r.root_key,
+        max({'depth': l.depth, 'taken_ns': t.taken_ns, 'take_id': r.take_id}) AS last_take
+    FROM query_table(reached) AS r
+    JOIN query_table(lineages) AS l ON r.path_id = l.prefix_id
+    JOIN store.take AS t ON r.take_id = t.take_id
+    SEMI JOIN query_table(missing) AS m ON l.path_id = m.path_id AND r.root_key = m.root_key
+    GROUP BY l.path_id, r.root_key
 ),
 -- The step at which each root got stuck; none where only the end is missing.
 stuck AS (
@@ -42,7 +38,7 @@ stuck AS (
         CASE WHEN p.last_take IS NULL THEN m.publication_id ELSE c.publication_id END
             AS publication_id
     FROM query_table(missing) AS m
-    JOIN progress AS p ON m.path_id = p.path_id AND m.root_key = p.root_key
+    LEFT JOIN progress AS p ON m.path_id = p.path_id AND m.root_key = p.root_key
     LEFT JOIN query_table(lineages) AS l
         ON m.path_id = l.path_id AND l.depth = coalesce(p.last_take.depth, 0) + 1
     LEFT JOIN query_table(prefixes) AS n ON l.prefix_id = n.path_id
@@ -87,14 +83,14 @@ inactive AS (
         AND n.state IN ('unconfigured', 'configuring', 'inactive', 'cleaningup', 'finalized')
 ),
 managed AS (
-    SELECT DISTINCT i.publisher_id
-    FROM inactive AS i
-    ANTI JOIN (
+    SELECT publisher_id, start_ns, end_ns
+    FROM inactive
+    WHERE publisher_id NOT IN (
         SELECT i.publisher_id
         FROM inactive AS i
         JOIN store.publication AS b
             ON i.publisher_id = b.publisher_id AND b.start_ns BETWEEN i.start_ns AND i.end_ns
-    ) AS b ON i.publisher_id = b.publisher_id
+    )
 ),
 -- A service that was asked, or an answer to another node, may lead to a publication later.
 asked AS (
@@ -103,34 +99,32 @@ asked AS (
     SELECT callback_instance_id FROM store.link_response WHERE list_contains(runs, run_id)
 ),
 -- Why a message was not followed by a publication, where that is known.
-withheld AS (
+explained AS (
     SELECT
-        s.path_id, s.root_key,
+        s.*,
         CASE
-            WHEN s.route = [] AND m.publisher_id IS NOT NULL THEN 'node_inactive'
+            WHEN s.publisher_id IS NULL OR s.publication_id IS NOT NULL OR s.is_cached THEN NULL
+            WHEN s.route = [] AND s.taken_ns < i.end_ns THEN 'node_inactive'
             WHEN c.end_ns IS NOT NULL AND NOT c.is_loss_affected
                 AND (s.route = [] OR a.callback_instance_id IS NULL) THEN 'no_output'
-        END AS reason
+        END AS withheld
     FROM stuck AS s
     LEFT JOIN store.callback_instance AS c ON s.take_id = c.take_id
     LEFT JOIN (FROM asked WHERE has_calls) AS a ON c.callback_instance_id = a.callback_instance_id
-    ASOF LEFT JOIN (FROM inactive WHERE has_states) AS i
+    ASOF LEFT JOIN (FROM managed WHERE has_states) AS i
         ON s.publisher_id = i.publisher_id AND s.taken_ns >= i.start_ns
-    LEFT JOIN (FROM managed WHERE has_states) AS m
-        ON i.publisher_id = m.publisher_id AND s.taken_ns < i.end_ns
-    WHERE s.publisher_id IS NOT NULL AND s.publication_id IS NULL AND NOT s.is_cached
 )
 SELECT
     s.path_id, s.root_key,
     CASE
         WHEN s.publisher_id IS NULL THEN 'callback_not_finished'
         WHEN s.publication_id IS NOT NULL THEN coalesce(u.reason, 'unknown')
-        ELSE coalesce(w.reason, 'not_published')
+        ELSE coalesce(s.withheld, 'not_published')
     END AS reason,
     s.publication_id IS NULL AND s.is_cached AS is_cached,
     coalesce(
         CASE
-            WHEN w.reason IS NOT NULL OR u.reason IN ('no_longer_taken', 'reader_in_callback')
+            WHEN s.withheld IS NOT NULL OR u.reason IN ('no_longer_taken', 'reader_in_callback')
                 THEN false
             WHEN s.publisher_id IS NULL THEN s.taken_ns > f.last_ns
             WHEN s.publication_id IS NOT NULL THEN
@@ -143,14 +137,13 @@ SELECT
         WHEN s.publisher_id IS NULL OR s.publication_id IS NULL
             THEN derive.corrected_ns(p.last_seen_ns, k)
     END AS recorded_until_ns
-FROM stuck AS s
+FROM explained AS s
 LEFT JOIN store.publication AS b ON s.publication_id = b.publication_id
 LEFT JOIN delivered AS d
     ON s.publisher_id = d.publisher_id AND s.subscription_id = d.subscription_id
 LEFT JOIN finished AS f ON s.path_id = f.path_id
 LEFT JOIN store.undelivered AS u
     ON s.publication_id = u.publication_id AND s.subscription_id = u.subscription_id
-LEFT JOIN withheld AS w ON s.path_id = w.path_id AND s.root_key = w.root_key
 LEFT JOIN store.take AS t ON s.take_id = t.take_id
 LEFT JOIN store.process AS p ON t.process_id = p.process_id
 LEFT JOIN derive.process_clock AS k ON t.process_id = k.process_id

@@ -207,11 +207,11 @@ full_house AS (
         b.executor_id,
         derive.corrected_ns(b.start_ns, c) AS start_ns,
         derive.corrected_ns(b.end_ns, c) AS end_ns
-    FROM derive.executor_full AS b
+    FROM derive.executor_busy AS b
     JOIN (SELECT DISTINCT executor_id, process_id FROM meanwhile) AS p
         ON b.executor_id = p.executor_id
     JOIN derive.process_clock AS c ON p.process_id = c.process_id
-    WHERE has_teams
+    WHERE has_teams AND b.thread_count > 1
 ),
 exclusion AS MATERIALIZED (FROM derive.callback_exclusion WHERE has_teams),
 occupied AS (

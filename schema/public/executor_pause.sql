@@ -13,7 +13,7 @@ WITH pause AS (
         q.run_id, q.thread_id, q.activity,
         derive.corrected_ns(q.start_ns, c) AS start_ns,
         derive.corrected_ns(q.end_ns, c) AS end_ns
-    FROM derive.queue_activity(runs, window_start_ns, window_end_ns) AS q
+    FROM derive.queue_activity(runs) AS q
     JOIN store.thread AS t ON q.thread_id = t.thread_id
     JOIN derive.process_clock AS c ON t.process_id = c.process_id
 )

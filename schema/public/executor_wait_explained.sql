@@ -52,8 +52,7 @@ ready AS MATERIALIZED (
         r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.since,
         r.origin_ns, coalesce(a.arrived_ns, r.earliest_ns) AS earliest_ns,
         coalesce(a.arrived_ns, r.latest_ns) AS latest_ns, r.start_ns, r.thread_count, r.picked_ns,
-        r.wait_start_ns, r.wait_end_ns, r.wait_before_ns, r.previous_wait_end_ns,
-        r.is_loss_affected, a.until_arrival_ns
+        r.wait_start_ns, r.previous_wait_end_ns, r.is_loss_affected, a.until_arrival_ns
     FROM query_table(waits) AS r
     LEFT JOIN arrived AS a ON r.callback_instance_id = a.callback_instance_id
 ),
@@ -80,7 +79,7 @@ moment AS (
 ran AS (
     SELECT
         m.callback_instance_id, m.callback_id, m.which,
-        coalesce(s.before_ns + least(m.at_ns, s.end_ns) - s.start_ns, 0) AS until_ns
+        derive.passed_ns(s, m.at_ns) AS until_ns
     FROM moment AS m
     ASOF LEFT JOIN derive.callback_running AS s
         ON m.executor_id = s.executor_id AND m.callback_id = s.callback_id

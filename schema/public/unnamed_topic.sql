@@ -41,8 +41,8 @@ SELECT
     coalesce(
         sum(message_count) FILTER (kind = 'publisher'), max(message_count)
     )::BIGINT AS message_count,
-    nullif(derive.first_three(CASE WHEN kind = 'publisher' THEN node END), '') AS publishers,
-    nullif(derive.first_three(CASE WHEN kind = 'subscription' THEN node END), '') AS subscribers,
+    nullif(derive.names_in_words(CASE WHEN kind = 'publisher' THEN node END), '') AS publishers,
+    nullif(derive.names_in_words(CASE WHEN kind = 'subscription' THEN node END), '') AS subscribers,
     min(node_id) FILTER (kind = 'publisher') AS publishing_node_id,
     min(node_id) FILTER (kind = 'subscription') AS node_id,
     arg_min(entry, (kind <> 'publisher', -message_count, id)) AS entry

@@ -285,10 +285,6 @@ class _HeaderColumns:
         possible = range(form.id.mask + 1)
         known = np.array(sorted(i for i in layout.classes if i in possible), np.uint64)
         numbers = np.array([layout.classes[int(i)].number for i in known], np.uint32)
-        if known.size and int(known[-1]) < 1 << 16:
-            table = np.zeros(int(known[-1]) + 1, np.uint32)
-            table[known] = numbers
-            return table[ids]
         return numbers[np.searchsorted(known, ids)]
 
 

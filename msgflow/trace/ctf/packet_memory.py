@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import weakref
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -46,13 +45,11 @@ def room_for(size: int) -> int:
 class Loader:
     """Keeps the packets of the current batch in memory.
 
-    Packets that the next batch needs, too, are copied to its memory. Buffers of memories that are
-    no longer in use are used again.
+    Packets that the next batch needs, too, are copied to its memory.
     """
 
     def __init__(self) -> None:
         self.memory = Memory(bytearray(PADDING))  # where the packets of the current batch are
-        self._rooms: list[tuple[bytearray, weakref.ref[Memory]]] = []
         self._files: dict[Path, int] = {}
 
     def load(self, entries: Sequence[Entry]) -> list[Entry]:
@@ -94,12 +91,7 @@ class Loader:
 
     def _new_memory(self, size: int) -> Memory:
         size += PADDING
-        used = [(room, user) for room, user in self._rooms if user() is not None]
-        free = [room for room, user in self._rooms if user() is None and len(room) >= size]
-        room = free[0] if free else bytearray(size)
-        memory = Memory(room)
-        self._rooms = [*used, (room, weakref.ref(memory))]
-        return memory
+        return Memory(bytearray(size))
 
     def _read(self, entry: Entry, target: memoryview) -> bool:
         path = entry.packet.path

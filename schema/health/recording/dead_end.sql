@@ -22,9 +22,9 @@ input AS (
     GROUP BY node_id, topic_name
 ),
 output AS (
-    SELECT node_id, derive.first_three(published) AS published
+    SELECT node_id, derive.names_in_words(published) AS published
     FROM (
-        SELECT node_id, derive.first_three(output_topic) || ' ' || cause AS published
+        SELECT node_id, derive.names_in_words(output_topic) || ' ' || cause AS published
         FROM dead_end
         WHERE is_likely
         GROUP BY node_id, cause

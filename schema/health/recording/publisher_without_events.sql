@@ -12,7 +12,7 @@
 WITH silent AS (
     SELECT
         b.run_id, b.topic_name,
-        derive.first_three(
+        derive.names_in_words(
             printf(
                 '%s (%s %d on %s)', coalesce(n.full_name, '?'), coalesce(p.name, '?'), p.pid,
                 h.hostname

@@ -81,9 +81,9 @@ happened AS (
 ),
 -- Callbacks of one subscription lead on, or none does.
 ended AS (
-    SELECT d.subscription_id, derive.first_three(d.published) AS published
+    SELECT d.subscription_id, derive.names_in_words(d.published) AS published
     FROM (
-        SELECT subscription_id, derive.first_three(output_topic) || ' ' || cause AS published
+        SELECT subscription_id, derive.names_in_words(output_topic) || ' ' || cause AS published
         FROM main.dead_end([$run_id])
         WHERE NOT is_loop
         GROUP BY subscription_id, cause

@@ -58,8 +58,8 @@ ended AS (
 ),
 last AS (
     SELECT
-        derive.first_three(node) AS nodes,
-        derive.first_three(topic_name) AS topics,
+        derive.names_in_words(node) AS nodes,
+        derive.names_in_words(topic_name) AS topics,
         min(rank) = 1 AS is_joint,
         bool_or(is_dead_end) AS is_dead_end,
         min(rank) = 4 AS is_sink
@@ -67,7 +67,7 @@ last AS (
     WHERE rank = (SELECT min(rank) FROM ended)
 ),
 first AS (
-    SELECT derive.first_three(main.node_label(n.full_name, p.name, p.pid)) AS nodes
+    SELECT derive.names_in_words(main.node_label(n.full_name, p.name, p.pid)) AS nodes
     -- What a publisher that is not traced sends begins where it is received.
     FROM (
         SELECT DISTINCT b.publishing_id

@@ -60,24 +60,20 @@ apart AS (
 -- When each packet should be received. What is within a second of that lies in the same second or
 -- in a neighbouring one.
 due AS (
-    SELECT s.event_id, s.trace_id, s.ts_ns, s.key, a.to_clock_id, s.ts_ns + a.shift_ns AS due_ns
+    SELECT
+        s.event_id, s.trace_id, s.ts_ns, s.key, a.to_clock_id,
+        s.ts_ns + a.shift_ns AS due_ns,
+        unnest(range(due_ns // 1_000_000_000 - 1, due_ns // 1_000_000_000 + 2)) AS second
     FROM staging.single_packet AS s
     JOIN apart AS a ON s.clock_id = a.from_clock_id
     WHERE s.is_sent
-),
-expected AS (
-    SELECT
-        event_id, trace_id, ts_ns, key, to_clock_id, due_ns,
-        unnest([due_ns // 1_000_000_000 - 1, due_ns // 1_000_000_000,
-            due_ns // 1_000_000_000 + 1]) AS second
-    FROM due
 ),
 matched AS (
     SELECT
         s.event_id AS sent_event_id, r.event_id AS received_event_id,
         s.trace_id AS sent_trace_id, r.trace_id AS received_trace_id,
         s.ts_ns AS sent_ns, r.ts_ns AS received_ns
-    FROM expected AS s
+    FROM due AS s
     JOIN staging.single_packet AS r
         ON s.key = r.key AND s.to_clock_id = r.clock_id AND s.second = r.ts_ns // 1_000_000_000
     WHERE NOT r.is_sent AND abs(r.ts_ns - s.due_ns) < 1_000_000_000

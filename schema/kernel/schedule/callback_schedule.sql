@@ -20,6 +20,7 @@ part AS (
         sum(c.end_ns - c.start_ns) FILTER (WHERE s.state = 'sleeping') AS sleeping_ns,
         sum(c.end_ns - c.start_ns) FILTER (WHERE s.state = 'uninterruptible')
             AS uninterruptible_ns,
+        sum(c.end_ns - c.start_ns) FILTER (WHERE s.state <> 'unknown') AS known_ns,
         count(*) FILTER (WHERE s.state = 'preempted' AND m.is_first AND c.is_begin)
             AS preemption_count,
         count(*) FILTER (WHERE s.state = 'running' AND m.is_migration AND c.is_begin)
@@ -45,11 +46,10 @@ interrupt AS (
 handled AS (
     SELECT
         c.callback_instance_id, i.kind,
-        sum(least(i.end_ns, c.end_ns) - greatest(i.start_ns, c.start_ns)) AS length_ns
+        least(i.end_ns, c.end_ns) - greatest(i.start_ns, c.start_ns) AS length_ns
     FROM interrupt AS i
     JOIN staging.callback_state AS c ON i.state_number = c.state_number
     WHERE i.end_ns > c.start_ns AND i.start_ns < c.end_ns
-    GROUP BY ALL
 ),
 interrupted AS (
     SELECT
@@ -75,11 +75,7 @@ SELECT
     coalesce(COLUMNS([
         'running_ns', 'preempted_ns', 'runnable_ns', 'sleeping_ns', 'uninterruptible_ns'
     ]), 0)::BIGINT,
-    (
-        i.end_ns - i.start_ns - coalesce(p.running_ns, 0) - coalesce(p.preempted_ns, 0)
-        - coalesce(p.runnable_ns, 0) - coalesce(p.sleeping_ns, 0)
-        - coalesce(p.uninterruptible_ns, 0)
-    )::BIGINT AS unknown_ns,
+    (i.end_ns - i.start_ns - coalesce(p.known_ns, 0))::BIGINT AS unknown_ns,
     CASE WHEN r.has_irq THEN coalesce(h.irq_ns, 0)::BIGINT END AS irq_ns,
     CASE WHEN r.has_softirq THEN coalesce(h.softirq_ns, 0)::BIGINT END AS softirq_ns,
     coalesce(p.preemption_count, 0) AS preemption_count,

@@ -4,20 +4,16 @@
 WITH extent AS (
     SELECT thread_id, min(number) AS first_number FROM staging.thread_state GROUP BY thread_id
 ),
-begun AS (
-    SELECT i.callback_instance_id, i.thread_id, i.start_ns, i.end_ns, s.number
-    FROM staging.callback_instance AS i
-    ASOF LEFT JOIN staging.thread_state AS s
-        ON i.thread_id = s.thread_id AND i.start_ns >= s.start_ns
-    WHERE i.end_ns > i.start_ns
-),
 covered AS (
     SELECT
-        b.callback_instance_id, b.start_ns, b.end_ns,
-        unnest(range(coalesce(b.number, e.first_number), s.number + 1)) AS number
-    FROM begun AS b
-    JOIN extent AS e ON b.thread_id = e.thread_id
-    ASOF JOIN staging.thread_state AS s ON b.thread_id = s.thread_id AND b.end_ns > s.start_ns
+        i.callback_instance_id, i.start_ns, i.end_ns,
+        unnest(range(coalesce(f.number, e.first_number), l.number + 1)) AS number
+    FROM staging.callback_instance AS i
+    JOIN extent AS e ON i.thread_id = e.thread_id
+    ASOF JOIN staging.thread_state AS l ON i.thread_id = l.thread_id AND i.end_ns > l.start_ns
+    ASOF LEFT JOIN staging.thread_state AS f
+        ON i.thread_id = f.thread_id AND i.start_ns >= f.start_ns
+    WHERE i.end_ns > i.start_ns
 )
 SELECT
     c.callback_instance_id, c.number AS state_number,

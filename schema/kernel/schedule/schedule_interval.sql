@@ -52,11 +52,6 @@ placed AS (
     SELECT
         s.*,
         coalesce(s.next_ns, greatest(f.end_ns, s.at_ns)) AS end_ns,
-        k.event_id AS waking_event_id,
-        CASE
-            WHEN k.at_ns IS NOT NULL OR s.next_unseen_since_ns IS NOT NULL
-                THEN greatest(coalesce(k.at_ns, s.next_unseen_since_ns), s.at_ns)
-        END AS slept_until_ns,
         CASE
             WHEN s.is_on THEN CASE
                 WHEN s.is_next_on OR s.next_cpu <> s.cpu THEN 'unknown'
@@ -69,7 +64,13 @@ placed AS (
             WHEN s.prev_state & 48 <> 0 OR (s.next_ns IS NULL AND s.prev_state & 64 <> 0) THEN NULL
             WHEN s.prev_state & 2 <> 0 THEN 'uninterruptible'
             ELSE 'sleeping'
-        END AS state
+        END AS state,
+        state IN ('sleeping', 'uninterruptible') AS is_asleep,
+        CASE WHEN is_asleep THEN k.event_id END AS waking_event_id,
+        CASE
+            WHEN is_asleep AND coalesce(k.at_ns, s.next_unseen_since_ns) IS NOT NULL
+                THEN greatest(coalesce(k.at_ns, s.next_unseen_since_ns), s.at_ns)
+        END AS slept_until_ns
     FROM step AS s
     JOIN life AS f ON s.thread_id = f.thread_id AND s.tid = f.tid
     LEFT JOIN waking AS k ON s.thread_id = k.thread_id AND s.tid = k.tid AND s.number = k.number
@@ -77,11 +78,8 @@ placed AS (
 interval AS (
     SELECT
         thread_id, tid, trace_index, at_ns AS start_ns,
-        CASE WHEN state IN ('sleeping', 'uninterruptible')
-            THEN coalesce(slept_until_ns, end_ns) ELSE end_ns END AS end_ns,
-        state, cpu, next_cpu, priority,
-        CASE WHEN state IN ('sleeping', 'uninterruptible') THEN waking_event_id END
-            AS waking_event_id
+        coalesce(slept_until_ns, end_ns) AS end_ns,
+        state, cpu, next_cpu, priority, waking_event_id
     FROM placed
     WHERE state IS NOT NULL
     UNION ALL
@@ -90,7 +88,7 @@ interval AS (
         CASE WHEN next_unseen_since_ns IS NULL THEN 'runnable' ELSE 'unknown' END,
         cpu, next_cpu, priority, waking_event_id
     FROM placed
-    WHERE state IN ('sleeping', 'uninterruptible') AND slept_until_ns IS NOT NULL
+    WHERE slept_until_ns IS NOT NULL
     UNION ALL
     -- What was before the first switch.
     SELECT

@@ -6,22 +6,23 @@
 -- param: of_topics VARCHAR  Kind of the objects of topics: 'publisher' of servers,
 --     'subscription' of clients
 CREATE OR REPLACE MACRO derive.action_object(of_calls, of_topics) AS TABLE
-WITH endpoint AS MATERIALIZED (FROM derive.action_endpoint)
+WITH endpoint AS MATERIALIZED (
+    FROM derive.action_endpoint WHERE kind IN (of_calls, of_topics)
+)
 SELECT
     g.run_id, g.process_id, g.node_id, g.action_name, g.created_ns, g.object_id AS goal_object_id,
-    c.object_id AS cancel_object_id, r.object_id AS result_object_id,
-    f.object_id AS feedback_object_id, s.object_id AS status_object_id
-FROM endpoint AS g
-ASOF LEFT JOIN (FROM endpoint WHERE kind = of_calls AND part = 'cancel_goal') AS c
-    ON g.process_id = c.process_id AND g.action_name = c.action_name
-    AND g.created_ns <= c.created_ns
-ASOF LEFT JOIN (FROM endpoint WHERE kind = of_calls AND part = 'get_result') AS r
-    ON g.process_id = r.process_id AND g.action_name = r.action_name
-    AND g.created_ns <= r.created_ns
-ASOF LEFT JOIN (FROM endpoint WHERE kind = of_topics AND part = 'feedback') AS f
-    ON g.process_id = f.process_id AND g.action_name = f.action_name
-    AND g.created_ns <= f.created_ns
-ASOF LEFT JOIN (FROM endpoint WHERE kind = of_topics AND part = 'status') AS s
-    ON g.process_id = s.process_id AND g.action_name = s.action_name
-    AND g.created_ns <= s.created_ns
-WHERE g.kind = of_calls AND g.part = 'send_goal'
+    any_value(o.object_id) FILTER (o.part = 'cancel_goal') AS cancel_object_id,
+    any_value(o.object_id) FILTER (o.part = 'get_result') AS result_object_id,
+    any_value(o.object_id) FILTER (o.part = 'feedback') AS feedback_object_id,
+    any_value(o.object_id) FILTER (o.part = 'status') AS status_object_id
+FROM (
+    SELECT *, unnest(['cancel_goal', 'get_result', 'feedback', 'status']) AS other
+    FROM endpoint
+    WHERE kind = of_calls AND part = 'send_goal'
+) AS g
+ASOF LEFT JOIN endpoint AS o
+    ON g.process_id = o.process_id
+    AND g.action_name = o.action_name
+    AND g.other = o.part
+    AND g.created_ns <= o.created_ns
+GROUP BY g.run_id, g.process_id, g.node_id, g.action_name, g.created_ns, g.object_id

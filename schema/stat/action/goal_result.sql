@@ -54,46 +54,40 @@ followed AS (
     QUALIFY count(*) OVER (PARTITION BY r.request_id) = 1
 ),
 step AS (
-    SELECT g.party, g.at_ns, g.goal_id, NULL::BIGINT AS request_id, 1 AS change
-    FROM goal AS g
-    ANTI JOIN followed AS f ON g.goal_id = f.goal_id
-    UNION ALL
-    SELECT a.party, a.at_ns, NULL, a.request_id, -1
-    FROM asked AS a
-    ANTI JOIN followed AS f ON a.request_id = f.request_id
+    SELECT *, row_number() OVER (
+        PARTITION BY party ORDER BY at_ns, change DESC, goal_id, request_id
+    ) AS number
+    FROM (
+        SELECT party, at_ns, goal_id, NULL::BIGINT AS request_id, 1 AS change FROM goal
+        UNION ALL
+        SELECT party, at_ns, NULL, request_id, -1 FROM asked
+    ) AS s
+    WHERE NOT EXISTS (
+        FROM followed AS f WHERE s.goal_id = f.goal_id OR s.request_id = f.request_id
+    )
 ),
 summed AS (
-    SELECT *, sum(change) OVER earlier AS balance
-    FROM step
-    WINDOW earlier AS (
-        PARTITION BY party ORDER BY at_ns, change DESC, goal_id, request_id
-        ROWS UNBOUNDED PRECEDING
-    )
+    SELECT *, sum(change) OVER (PARTITION BY party ORDER BY number) AS balance FROM step
 ),
 -- A request without an open goal leaves none open: the sum begins anew.
 counted AS (
-    SELECT *, balance - least(0, min(balance) OVER earlier) AS open
+    SELECT
+        *,
+        balance - least(0, min(balance) OVER (PARTITION BY party ORDER BY number)) AS open
     FROM summed
-    WINDOW earlier AS (
-        PARTITION BY party ORDER BY at_ns, change DESC, goal_id, request_id
-        ROWS UNBOUNDED PRECEDING
-    )
 ),
 parted AS (
     SELECT
         *,
         count(*) FILTER (open = 0) OVER (
-            PARTITION BY party ORDER BY at_ns, change DESC, goal_id, request_id
-            ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+            PARTITION BY party ORDER BY number ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
         ) AS block
     FROM counted
 ),
 placed AS (
     SELECT
         party, block, goal_id, request_id,
-        row_number() OVER (
-            PARTITION BY party, block, change ORDER BY at_ns, goal_id, request_id
-        ) AS place,
+        row_number() OVER (PARTITION BY party, block, change ORDER BY number) AS place,
         count(goal_id) OVER (PARTITION BY party, block) AS goals,
         count(request_id) OVER (PARTITION BY party, block) AS requests
     FROM parted

@@ -4,9 +4,9 @@
 --     found it (unless that callback ran in between: then more of its input may have waited). At
 --     the latest when the executor last learned what is ready, before it picked this callback. In
 --     an events executor, which serves what came first first, also not after what its own thread
---     published and it ran then or later. With that wait of the executor, the end of the wait
---     before it, the time spent waiting before, and the moment at which its thread began to look
---     for work and picked it (the start, with one thread or where that does not show).
+--     published and it ran then or later. With the begin of that wait of the executor, the end
+--     of the wait before it, and the moment at which its thread began to look for work and picked
+--     it (the start, with one thread or where that does not show).
 -- grain: one row per callback instance that is not nested in another
 -- param: executors VARCHAR  Name of rows of executor_id, until_ns: those to look at. Callback
 --     instances that began after the last of these moments are left out (where all are NULL: none)
@@ -35,21 +35,20 @@ release AS (
 -- A thread among several picks what it will run when it begins to look, not when it runs it:
 -- another thread may have gone to wait in the meantime.
 picked AS (
-    SELECT *, start_ns AS picked_ns FROM release WHERE thread_count = 1
-    UNION ALL
-    SELECT r.*, s.start_ns
-    FROM (SELECT * FROM release WHERE has_teams AND thread_count > 1) AS r
+    SELECT
+        r.*, CASE WHEN r.thread_count = 1 THEN r.start_ns ELSE s.start_ns END AS picked_ns
+    FROM release AS r
     ASOF LEFT JOIN (
         SELECT e.thread_id, e.start_ns
         FROM store.executor_state AS e
         JOIN store.executor_thread AS x ON e.thread_id = x.thread_id
         JOIN sized AS z ON x.executor_id = z.executor_id
-        WHERE e.state = 'process' AND z.thread_count > 1
+        WHERE has_teams AND e.state = 'process' AND z.thread_count > 1
     ) AS s ON r.thread_id = s.thread_id AND r.start_ns >= s.start_ns
 ),
 polled AS (
     SELECT
-        p.*, w.start_ns AS wait_start_ns, w.end_ns AS wait_end_ns, w.before_ns AS wait_before_ns,
+        p.*, w.start_ns AS wait_start_ns, w.end_ns AS wait_end_ns,
         w.previous_end_ns AS previous_wait_end_ns, w.asleep_ns
     FROM picked AS p
     ASOF LEFT JOIN derive.executor_poll('sized') AS w
@@ -59,11 +58,6 @@ broken AS (
     SELECT x.executor_id, b.resumed_ns
     FROM store.thread_break AS b
     JOIN store.executor_thread AS x ON b.thread_id = x.thread_id
-),
-resumed AS (
-    SELECT r.callback_instance_id, b.resumed_ns
-    FROM (SELECT * FROM release SEMI JOIN broken USING (executor_id)) AS r
-    ASOF JOIN broken AS b ON r.executor_id = b.executor_id AND r.start_ns >= b.resumed_ns
 ),
 known AS (
     SELECT
@@ -80,7 +74,7 @@ known AS (
                 THEN p.asleep_ns END
         ) AS not_ready_ns
     FROM polled AS p
-    LEFT JOIN resumed AS b ON p.callback_instance_id = b.callback_instance_id
+    ASOF LEFT JOIN broken AS b ON p.executor_id = b.executor_id AND p.start_ns >= b.resumed_ns
 ),
 bounded AS (
     SELECT
@@ -102,6 +96,6 @@ SELECT
         AS latest_ns,
     start_ns, thread_count,
     coalesce(picked_ns, start_ns) AS picked_ns,
-    wait_start_ns, wait_end_ns, wait_before_ns, previous_wait_end_ns,
+    wait_start_ns, previous_wait_end_ns,
     coalesce(resumed_ns > coalesce(earliest_ns, polled_ns), false) AS is_loss_affected
 FROM bounded

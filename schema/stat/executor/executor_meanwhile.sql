@@ -18,27 +18,15 @@ run AS (
     FROM derive.executor_run
     WHERE end_ns > start_ns
 ),
--- What a thread runs is in order, so the instances that overlap a wait are neighbours. There are
--- none, as a rule, where the last one that began before the wait ended was over when it began.
-busy AS (
-    SELECT w.*, l.position AS last_position
+-- What a thread runs is in order, so the instances that overlap a wait are neighbours: from the one
+-- that was under way when the wait began, or the one before it, to the last that began before its
+-- end. There are none, as a rule, where the last one was over when the wait began.
+pair AS (
+    SELECT w.*, unnest(range(coalesce(f.position, 1), l.position + 1)) AS position
     FROM waiting AS w
     ASOF JOIN run AS l ON w.thread_id = l.thread_id AND w.start_ns > l.start_ns
-    WHERE l.end_ns > w.from_ns
-),
--- The first is the one that was under way when the wait began, or the next one.
-bounded AS (
-    SELECT
-        w.*,
-        CASE WHEN f.end_ns > w.from_ns THEN f.position ELSE coalesce(f.position, 0) + 1 END
-            AS first_position
-    FROM busy AS w
     ASOF LEFT JOIN run AS f ON w.thread_id = f.thread_id AND w.from_ns >= f.start_ns
-),
-pair AS (
-    SELECT *, unnest(range(first_position, last_position + 1)) AS position
-    FROM bounded
-    WHERE first_position <= last_position
+    WHERE l.end_ns > w.from_ns
 )
 SELECT
     p.run_id, p.callback_instance_id, r.callback_instance_id AS meanwhile_id,
@@ -47,3 +35,4 @@ SELECT
     greatest(least(r.end_ns, p.start_ns) - greatest(r.start_ns, p.latest_ns), 0) AS certain_ns
 FROM pair AS p
 JOIN run AS r ON p.thread_id = r.thread_id AND p.position = r.position
+WHERE r.end_ns > p.from_ns

@@ -9,50 +9,27 @@
 --     (until_ns). Waits that began after the latest of these moments are left out, unless all
 --     are NULL
 CREATE OR REPLACE MACRO derive.executor_poll(executors) AS TABLE
-WITH interval AS MATERIALIZED (
-    SELECT run_id, executor_id, thread_id, state, start_ns, end_ns, callback_instance_id
+WITH wait AS (
+    SELECT run_id, executor_id, thread_id, start_ns, end_ns
     FROM derive.executor_interval
-    WHERE end_ns IS NOT NULL
-        AND (state = 'wait' OR callback_instance_id IS NOT NULL)
+    WHERE state = 'wait'
+        AND end_ns IS NOT NULL
         -- By thread, not by executor: DuckDB leaves other threads out before it orders the rows.
         AND thread_id IN (
             SELECT thread_id
             FROM store.executor_thread
             WHERE executor_id IN (SELECT executor_id FROM query_table(executors))
         )
-),
-wait AS (
-    SELECT run_id, executor_id, thread_id, start_ns, end_ns
-    FROM interval
-    WHERE state = 'wait'
         AND start_ns <= (
             SELECT coalesce(max(until_ns), 9223372036854775807) FROM query_table(executors)
         )
 ),
--- Threads with a callback that may spin: the next event of the executor came before its end, and
--- the thread began a wait after it had begun.
-spinning AS (
-    SELECT DISTINCT i.thread_id
-    FROM store.callback_instance AS i
-    JOIN (SELECT thread_id, max(start_ns) AS start_ns FROM wait GROUP BY thread_id) AS w
-        ON i.thread_id = w.thread_id AND i.start_ns <= w.start_ns
-    ANTI JOIN interval AS s
-        ON i.callback_instance_id = s.callback_instance_id AND i.end_ns <= s.end_ns
-    WHERE i.depth = 1 AND i.end_ns > i.start_ns
-),
 own AS (
     SELECT w.run_id, w.executor_id, w.start_ns, w.end_ns
     FROM wait AS w
-    ANTI JOIN spinning AS s ON w.thread_id = s.thread_id
-    UNION ALL
-    SELECT w.run_id, w.executor_id, w.start_ns, w.end_ns
-    FROM (SELECT * FROM wait SEMI JOIN spinning USING (thread_id)) AS w
-    ASOF LEFT JOIN (
-        SELECT thread_id, start_ns, end_ns
-        FROM derive.executor_run
-        SEMI JOIN spinning USING (thread_id)
-    ) AS r ON w.thread_id = r.thread_id AND w.start_ns >= r.start_ns
-    WHERE r.end_ns IS NULL OR r.end_ns <= w.start_ns
+    ASOF LEFT JOIN derive.executor_run AS r
+        ON w.thread_id = r.thread_id AND w.start_ns >= r.start_ns
+    WHERE coalesce(r.end_ns <= w.start_ns, true)
 )
 SELECT
     run_id, executor_id, start_ns, end_ns,

@@ -9,67 +9,62 @@ WITH waiting AS MATERIALIZED (
     WHERE coalesce(earliest_ns, latest_ns) IS NOT NULL
         AND thread_id IN (SELECT thread_id FROM store.thread_state)
 ),
-stretch AS (
-    SELECT
-        false AS is_taken, thread_id, start_ns, end_ns, state,
-        NULL::BIGINT AS preemptor_thread_id, NULL::BIGINT AS preemptor_other_thread_id
-    FROM store.thread_state
-    WHERE state IN ('preempted', 'runnable')
-    UNION ALL
-    SELECT true, thread_id, start_ns, end_ns, state, preemptor_thread_id, preemptor_other_thread_id
-    FROM store.preemptor
-),
--- What begins and ends a callback needs a CPU: such a wait lies inside of a callback, or outside.
+-- What begins and ends a callback needs a CPU: such a state lies inside of a callback, or outside.
 outside AS MATERIALIZED (
     SELECT
-        s.*,
-        row_number() OVER (PARTITION BY s.is_taken, s.thread_id ORDER BY s.start_ns) AS number
-    FROM stretch AS s
+        s.thread_id, s.state, s.start_ns, s.end_ns,
+        row_number() OVER (PARTITION BY s.thread_id ORDER BY s.start_ns) AS number
+    FROM store.thread_state AS s
     ASOF LEFT JOIN (
         SELECT thread_id, start_ns, end_ns FROM store.callback_instance WHERE parent_id IS NULL
     ) AS i
         ON s.thread_id = i.thread_id AND s.start_ns >= i.start_ns
-    WHERE s.thread_id IN (SELECT thread_id FROM waiting) AND coalesce(i.end_ns <= s.start_ns, true)
+    WHERE s.state IN ('preempted', 'runnable')
+        AND s.thread_id IN (SELECT thread_id FROM waiting)
+        AND coalesce(i.end_ns <= s.start_ns, true)
 ),
 -- These follow each other on a thread, so those that overlap a wait are neighbours.
-reached AS (
-    SELECT
-        w.callback_instance_id, w.thread_id, w.from_ns, w.start_ns, l.is_taken,
-        l.number AS last_number
-    FROM (SELECT w.*, unnest([true, false]) AS is_taken FROM waiting AS w) AS w
-    ASOF JOIN outside AS l
-        ON w.is_taken = l.is_taken AND w.thread_id = l.thread_id AND w.start_ns > l.start_ns
+pair AS MATERIALIZED (
+    SELECT w.*, unnest(range(coalesce(f.number, 1), l.number + 1)) AS number
+    FROM waiting AS w
+    ASOF JOIN outside AS l ON w.thread_id = l.thread_id AND w.start_ns > l.start_ns
+    ASOF LEFT JOIN outside AS f ON w.thread_id = f.thread_id AND w.from_ns >= f.start_ns
     WHERE l.end_ns > w.from_ns
 ),
-pair AS (
+queued AS (
     SELECT
-        r.callback_instance_id, r.thread_id, r.from_ns, r.start_ns, r.is_taken,
-        unnest(range(coalesce(f.number, 1), r.last_number + 1)) AS number
-    FROM reached AS r
-    ASOF LEFT JOIN outside AS f
-        ON r.is_taken = f.is_taken AND r.thread_id = f.thread_id AND r.from_ns >= f.start_ns
-),
-overlap AS (
-    SELECT
-        p.callback_instance_id, o.is_taken, o.state, o.preemptor_thread_id,
-        o.preemptor_other_thread_id,
-        sum(least(o.end_ns, p.start_ns) - greatest(o.start_ns, p.from_ns))::BIGINT AS length_ns
+        p.callback_instance_id, o.state,
+        least(o.end_ns, p.start_ns) - greatest(o.start_ns, p.from_ns) AS length_ns
     FROM pair AS p
-    JOIN outside AS o
-        ON p.is_taken = o.is_taken AND p.thread_id = o.thread_id AND p.number = o.number
+    JOIN outside AS o ON p.thread_id = o.thread_id AND p.number = o.number
     WHERE o.end_ns > p.from_ns
-    GROUP BY ALL
+),
+summed AS (
+    SELECT
+        callback_instance_id,
+        sum(length_ns) FILTER (WHERE state = 'runnable') AS run_queue_ns,
+        sum(length_ns) FILTER (WHERE state = 'preempted') AS preempted_ns
+    FROM queued
+    GROUP BY callback_instance_id
+),
+preemptor AS (
+    SELECT
+        o.thread_id, o.number, p.start_ns, p.end_ns, coalesce(t.name, x.name) AS name
+    FROM store.preemptor AS p
+    ASOF JOIN outside AS o ON p.thread_id = o.thread_id AND p.start_ns >= o.start_ns
+    LEFT JOIN store.thread AS t ON p.preemptor_thread_id = t.thread_id
+    LEFT JOIN store.other_thread AS x ON p.preemptor_other_thread_id = x.other_thread_id
+    -- An idle CPU is not taken.
+    WHERE p.start_ns < o.end_ns AND coalesce(x.tid <> 0, true)
 ),
 named AS (
     SELECT
-        o.callback_instance_id, coalesce(t.name, x.name) AS name,
-        sum(o.length_ns)::BIGINT AS length_ns
-    FROM overlap AS o
-    LEFT JOIN store.thread AS t ON o.preemptor_thread_id = t.thread_id
-    LEFT JOIN store.other_thread AS x ON o.preemptor_other_thread_id = x.other_thread_id
-    -- An idle CPU is not taken.
-    WHERE o.is_taken AND coalesce(x.tid <> 0, true)
-    GROUP BY ALL
+        w.callback_instance_id, p.name,
+        sum(least(p.end_ns, w.start_ns) - greatest(p.start_ns, w.from_ns))::BIGINT AS length_ns
+    FROM pair AS w
+    JOIN preemptor AS p ON w.thread_id = p.thread_id AND w.number = p.number
+    WHERE p.end_ns > w.from_ns AND p.start_ns < w.start_ns
+    GROUP BY w.callback_instance_id, p.name
 ),
 taken AS (
     SELECT
@@ -78,21 +73,12 @@ taken AS (
         list(length_ns ORDER BY length_ns DESC, name) AS cpu_taken_ns
     FROM named
     GROUP BY callback_instance_id
-),
-queued AS (
-    SELECT
-        callback_instance_id,
-        sum(length_ns) FILTER (WHERE state = 'runnable') AS run_queue_ns,
-        sum(length_ns) FILTER (WHERE state = 'preempted') AS preempted_ns
-    FROM overlap
-    WHERE NOT is_taken
-    GROUP BY callback_instance_id
 )
 SELECT
     w.callback_instance_id,
-    coalesce(q.run_queue_ns, 0)::BIGINT AS run_queue_ns,
-    coalesce(q.preempted_ns, 0)::BIGINT AS preempted_ns,
+    coalesce(s.run_queue_ns, 0)::BIGINT AS run_queue_ns,
+    coalesce(s.preempted_ns, 0)::BIGINT AS preempted_ns,
     t.cpu_taken_by, t.cpu_taken_ns
 FROM waiting AS w
-LEFT JOIN queued AS q ON w.callback_instance_id = q.callback_instance_id
+LEFT JOIN summed AS s ON w.callback_instance_id = s.callback_instance_id
 LEFT JOIN taken AS t ON w.callback_instance_id = t.callback_instance_id

@@ -6,38 +6,14 @@
 --     may have run in the meantime, such as the callback of a client.
 -- grain: one row per interval of such a thread outside of callbacks and takes
 -- param: runs BIGINT[]  Runs to look at; NULL: all
--- param: window_start_ns BIGINT  Begin of a window, epoch ns; NULL: everything. What lies wholly
---     outside of it may be wrong
--- param: window_end_ns BIGINT  Its end
-CREATE OR REPLACE MACRO derive.queue_activity(runs, window_start_ns, window_end_ns) AS TABLE
-WITH queue AS (
-    SELECT x.run_id, x.executor_id, x.thread_id, t.process_id, p.host_id
+CREATE OR REPLACE MACRO derive.queue_activity(runs) AS TABLE
+WITH member AS MATERIALIZED (
+    SELECT x.run_id, x.executor_id, x.thread_id, p.host_id
     FROM store.executor AS e
     JOIN store.executor_thread AS x ON e.executor_id = x.executor_id
     JOIN store.thread AS t ON x.thread_id = t.thread_id
     JOIN store.process AS p ON t.process_id = p.process_id
     WHERE e.kind = 'events' AND (runs IS NULL OR list_contains(runs, e.run_id))
-),
-started AS (
-    SELECT
-        i.thread_id, i.start_ns,
-        derive.corrected_ns(i.start_ns, c) AS corrected_ns
-    FROM store.callback_instance AS i
-    JOIN queue AS q ON i.thread_id = q.thread_id
-    JOIN derive.process_clock AS c ON q.process_id = c.process_id
-    WHERE i.depth = 1 AND window_start_ns IS NOT NULL
-),
--- From the last callback that began before the window to the first one behind it.
-member AS (
-    SELECT
-        q.run_id, q.executor_id, q.thread_id, q.host_id,
-        coalesce(max(s.start_ns) FILTER (s.corrected_ns < window_start_ns), 0) AS from_ns,
-        coalesce(
-            min(s.start_ns) FILTER (s.corrected_ns >= window_end_ns), 9223372036854775807
-        ) AS until_ns
-    FROM queue AS q
-    LEFT JOIN started AS s ON q.thread_id = s.thread_id
-    GROUP BY ALL
 ),
 thread_state AS MATERIALIZED (
     SELECT thread_id, state, start_ns, end_ns
@@ -64,13 +40,12 @@ seen AS (
     LEFT JOIN store.link_transport AS l ON t.take_id = l.take_id
     LEFT JOIN store.publication AS b ON l.publication_id = b.publication_id
     LEFT JOIN store.process AS p ON b.process_id = p.process_id
-    WHERE i.depth = 1 AND i.start_ns BETWEEN m.from_ns AND m.until_ns
+    WHERE i.depth = 1
     UNION ALL
     SELECT t.thread_id, t.taken_ns, t.taken_ns, NULL
     FROM store.take AS t
     JOIN member AS m ON t.thread_id = m.thread_id
     ANTI JOIN store.callback_instance AS i ON t.take_id = i.take_id
-    WHERE t.taken_ns BETWEEN m.from_ns AND m.until_ns
     UNION ALL
     SELECT thread_id, failed_ns, failed_ns, NULL
     FROM store.failed_take

@@ -68,15 +68,6 @@ change AS (
     WHERE t.method <> 'callback_only' AND t.start_event_id IS NOT NULL
         AND (runs IS NULL OR list_contains(runs, t.run_id))
 ),
--- Each mark is the number of an event, with a digit that says which or what.
-marked AS NOT MATERIALIZED (
-    SELECT
-        run_id, thread_id, event_id, step, event_id * 8 + step AS place, at_ns, kind,
-        CASE WHEN step = 0 THEN event_id END AS break_mark,
-        CASE WHEN state > 0 THEN event_id * 4 + state END AS state_mark,
-        CASE WHEN step IN (1, 3) THEN event_id * 4 + step END AS run_mark
-    FROM change
-),
 -- The window by the clock of each thread, which is rounded. A window without limits has the least
 -- and the greatest number: less of them leaves room for the offset of a clock.
 extent AS (
@@ -91,46 +82,53 @@ extent AS (
 -- Where the changes of a thread around the window begin and end, and what held before.
 reach AS (
     SELECT
-        m.thread_id,
-        max(m.event_id) FILTER (m.at_ns < e.start_ns AND m.step < 4) AS first_event_id,
-        min(m.event_id) FILTER (m.at_ns > e.end_ns AND m.step < 4) AS last_event_id,
-        max(m.break_mark) FILTER (m.at_ns < e.start_ns) AS break_mark,
-        max(m.state_mark) FILTER (m.at_ns < e.start_ns) AS state_mark,
-        max(m.run_mark) FILTER (m.at_ns < e.start_ns) AS run_mark
-    FROM marked AS m
-    JOIN extent AS e ON m.thread_id = e.thread_id
-    GROUP BY m.thread_id
+        c.thread_id,
+        max(c.event_id) FILTER (c.at_ns < e.start_ns AND c.step < 4) AS first_event_id,
+        min(c.event_id) FILTER (c.at_ns > e.end_ns AND c.step < 4) AS last_event_id,
+        max(c.event_id) FILTER (c.at_ns < e.start_ns AND c.step = 0) AS break_event_id,
+        max(c.event_id) FILTER (c.at_ns < e.start_ns AND c.state > 0) AS state_event_id,
+        max(c.event_id) FILTER (c.at_ns < e.start_ns AND c.step IN (1, 3)) AS run_event_id
+    FROM change AS c
+    JOIN extent AS e ON c.thread_id = e.thread_id
+    GROUP BY c.thread_id
 ),
--- Marks grow: the last one is the highest. DuckDB takes longer for max over such a frame.
 situation AS (
     SELECT
-        m.run_id, m.thread_id, m.event_id, m.step, m.place, m.at_ns, m.kind,
-        greatest(arg_max(m.break_mark, m.place) OVER so_far, r.break_mark, -1) AS break_event_id,
-        greatest(arg_max(m.state_mark, m.place) OVER so_far, r.state_mark) AS state_mark,
-        greatest(arg_max(m.run_mark, m.place) OVER so_far, r.run_mark) AS run_mark
-    FROM marked AS m
-    LEFT JOIN reach AS r ON m.thread_id = r.thread_id
-    WHERE coalesce(m.event_id >= r.first_event_id, true)
-        AND coalesce(m.event_id <= r.last_event_id, true)
-    WINDOW so_far AS (PARTITION BY m.run_id, m.thread_id ORDER BY m.place ROWS UNBOUNDED PRECEDING)
+        c.run_id, c.thread_id, c.event_id, c.step, c.at_ns, c.kind,
+        coalesce(last_value(CASE WHEN c.step = 0 THEN c.event_id END IGNORE NULLS) OVER so_far, -1)
+            AS break_event_id,
+        last_value(CASE WHEN c.state > 0 THEN c.event_id END IGNORE NULLS) OVER so_far
+            AS state_event_id,
+        last_value(nullif(c.state, 0) IGNORE NULLS) OVER so_far AS state,
+        last_value(CASE WHEN c.step IN (1, 3) THEN c.event_id END IGNORE NULLS) OVER so_far
+            AS run_event_id,
+        last_value(CASE WHEN c.step IN (1, 3) THEN coalesce(c.running_id, 0) END IGNORE NULLS)
+            OVER so_far AS running_id
+    FROM change AS c
+    LEFT JOIN reach AS r ON c.thread_id = r.thread_id
+    WHERE (
+            coalesce(c.event_id >= r.first_event_id, true)
+            AND coalesce(c.event_id <= r.last_event_id, true)
+        )
+        OR c.event_id IN (r.break_event_id, r.state_event_id, r.run_event_id)
+    WINDOW so_far AS (
+        PARTITION BY c.run_id, c.thread_id ORDER BY c.event_id, c.step ROWS UNBOUNDED PRECEDING
+    )
 ),
--- A take while the executor executes is what it is about to do anyway.
+-- What held before a gap of the trace is not known behind it. A take while the executor executes is
+-- what it is about to do anyway.
 split AS (
     SELECT
-        run_id, thread_id, event_id, step, at_ns, kind, break_event_id, run_mark,
-        run_mark // 4 AS run_event_id,
-        CASE WHEN state_mark // 4 >= break_event_id THEN state_mark // 4 END AS state_event_id,
-        CASE WHEN state_mark // 4 >= break_event_id THEN state_mark % 4 ELSE 0 END AS state,
+        run_id, thread_id, event_id, step, at_ns, kind, break_event_id, run_event_id, running_id,
+        CASE WHEN state_event_id >= break_event_id THEN state_event_id END AS state_event_id,
+        CASE WHEN state_event_id >= break_event_id THEN state ELSE 0 END AS state,
         lead(at_ns) OVER on_thread AS next_ns,
         lead(step) OVER on_thread AS next_step,
         lead(kind) OVER on_thread AS next_kind,
-        lead(state_mark) OVER on_thread % 4 AS next_state
+        lead(state) OVER on_thread AS next_state
     FROM situation
-    WHERE step < 4 OR state_mark IS NULL OR state_mark % 4 = 2 OR state_mark // 4 < break_event_id
-    WINDOW on_thread AS (PARTITION BY run_id, thread_id ORDER BY place)
-),
-run_change AS (
-    SELECT thread_id, event_id * 4 + step AS run_mark, running_id FROM change WHERE step IN (1, 3)
+    WHERE step < 4 OR state IS NULL OR state = 2 OR state_event_id < break_event_id
+    WINDOW on_thread AS (PARTITION BY run_id, thread_id ORDER BY event_id, step)
 ),
 described AS (
     SELECT
@@ -141,9 +139,8 @@ described AS (
         i.callback_instance_id, i.kind,
         s.state > 0 AND coalesce(s.state_event_id > i.start_event_id, true) AS is_spinning
     FROM split AS s
-    LEFT JOIN run_change AS r ON s.thread_id = r.thread_id AND s.run_mark = r.run_mark
     LEFT JOIN instance AS i
-        ON r.running_id = i.callback_instance_id
+        ON s.running_id = i.callback_instance_id
         AND i.effective_end_event_id > s.event_id
         AND i.start_event_id >= s.break_event_id
 ),
@@ -176,4 +173,4 @@ FROM classified
 WHERE activity IS NOT NULL AND (end_ns > start_ns OR end_ns IS NULL)
 UNION ALL
 SELECT run_id, executor_id, thread_id, activity, start_ns, end_ns, NULL
-FROM derive.queue_activity(runs, window_start_ns, window_end_ns)
+FROM derive.queue_activity(runs)

@@ -71,40 +71,29 @@ followed AS (
     )
 ),
 -- Its creation is recorded a little later than the instant from which the periods count: a
--- hundredth of the period is allowed for that.
-slotted AS (
+-- hundredth of the period is allowed for that. A call shortly before such an instant was for that
+-- instant, or for the one before it, almost a period late. In the second case the instant is still
+-- to come.
+due AS (
     SELECT
-        c.callback_id, c.callback_instance_id, c.start_ns, c.period_ns, c.slack_ns,
-        c.previous_ns, c.created_ns + f.moved_ns AS origin_ns,
-        (c.previous_ns - c.created_ns - f.moved_ns + c.period_ns // 100) // c.period_ns AS slot,
-        (c.earlier_ns - c.created_ns - f.moved_ns + c.period_ns // 100) // c.period_ns
-            AS earlier_slot,
-        c.executor_id
-    FROM call AS c
-    JOIN followed AS f ON c.callback_id = f.callback_id AND c.slice = f.slice
-),
--- A call shortly before such an instant was for that instant, or for the one before it, almost a
--- period late. In the second case the instant is still to come.
-timed AS (
-    SELECT
-        callback_id, callback_instance_id, start_ns, period_ns, slack_ns, previous_ns, executor_id,
-        origin_ns + period_ns * CASE
-            WHEN previous_ns < origin_ns + period_ns * slot
+        c.callback_id, c.callback_instance_id, c.executor_id, c.start_ns, c.period_ns, c.slack_ns,
+        c.previous_ns,
+        c.created_ns + f.moved_ns AS origin_ns,
+        (c.previous_ns - origin_ns + c.period_ns // 100) // c.period_ns AS slot,
+        (c.earlier_ns - origin_ns + c.period_ns // 100) // c.period_ns AS earlier_slot,
+        origin_ns + c.period_ns * CASE
+            WHEN c.previous_ns < origin_ns + c.period_ns * slot
                 AND coalesce(earlier_slot, 0) + 1 < slot
                 THEN slot
             ELSE slot + 1
-        END AS next_ns
-    FROM slotted
-),
-due AS (
-    SELECT
-        callback_id, callback_instance_id, start_ns, period_ns, slack_ns, previous_ns, executor_id,
+        END AS next_ns,
         CASE
-            WHEN next_ns <= start_ns THEN next_ns
-            WHEN next_ns - start_ns <= period_ns // 100 THEN start_ns
-            WHEN next_ns - period_ns > previous_ns THEN next_ns - period_ns
+            WHEN next_ns <= c.start_ns THEN next_ns
+            WHEN next_ns - c.start_ns <= c.period_ns // 100 THEN c.start_ns
+            WHEN next_ns - c.period_ns > c.previous_ns THEN next_ns - c.period_ns
         END AS due_ns
-    FROM timed
+    FROM call AS c
+    JOIN followed AS f ON c.callback_id = f.callback_id AND c.slice = f.slice
 ),
 -- Up to when the threads of an executor had run callbacks, on average, for how long.
 ran AS MATERIALIZED (
@@ -119,7 +108,8 @@ ran AS MATERIALIZED (
 ),
 kept AS (
     SELECT
-        d.callback_id, d.callback_instance_id, d.start_ns, d.due_ns, d.previous_ns, d.period_ns,
+        d.callback_id, d.callback_instance_id, d.start_ns, d.due_ns,
+        d.previous_ns + d.period_ns AS latest_ns,
         (d.start_ns - d.due_ns <= d.slack_ns)::INTEGER AS is_punctual,
         coalesce(d.start_ns - d.due_ns <= greatest(
             d.slack_ns, 2 * s.last_ns, 2 * (s.ran_ns - coalesce(b.ran_ns, 0))
@@ -131,26 +121,18 @@ kept AS (
 ),
 around AS (
     SELECT
-        callback_id, callback_instance_id, start_ns, due_ns, previous_ns, period_ns,
+        callback_id, callback_instance_id, start_ns, due_ns, latest_ns,
         least(avg(is_kept) OVER behind, avg(is_kept) OVER ahead) >= 0.5 AS is_kept,
         least(avg(is_punctual) OVER behind, avg(is_punctual) OVER ahead) >= 0.5 AS is_punctual
     FROM kept
     WINDOW
-        behind AS (
-            PARTITION BY callback_id ORDER BY start_ns, callback_instance_id
-            ROWS BETWEEN 10 PRECEDING AND CURRENT ROW
-        ),
-        ahead AS (
-            PARTITION BY callback_id ORDER BY start_ns, callback_instance_id
-            ROWS BETWEEN CURRENT ROW AND 10 FOLLOWING
-        )
+        in_time AS (PARTITION BY callback_id ORDER BY start_ns, callback_instance_id),
+        behind AS (in_time ROWS BETWEEN 10 PRECEDING AND CURRENT ROW),
+        ahead AS (in_time ROWS BETWEEN CURRENT ROW AND 10 FOLLOWING)
 )
-SELECT callback_instance_id, due_ns, previous_ns + period_ns AS latest_ns
+SELECT callback_instance_id, due_ns, latest_ns
 FROM around
-QUALIFY is_kept OR bool_or(is_punctual) OVER (
-    PARTITION BY callback_id ORDER BY start_ns, callback_instance_id
-    ROWS UNBOUNDED PRECEDING
-) AND bool_or(is_punctual) OVER (
-    PARTITION BY callback_id ORDER BY start_ns, callback_instance_id
-    ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING
-)
+WINDOW in_time AS (PARTITION BY callback_id ORDER BY start_ns, callback_instance_id)
+QUALIFY is_kept
+    OR bool_or(is_punctual) OVER (in_time ROWS UNBOUNDED PRECEDING)
+    AND bool_or(is_punctual) OVER (in_time ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Iterable
 from pathlib import Path
 from random import Random
@@ -96,22 +95,6 @@ def test_events_earlier_than_their_packet(tmp_path: Path) -> None:
     assert [row[-1] for row in whole.rows["test:n"]] == [10, 15, 5, 12, 25, 40, 41, 45]
     for most_bytes, most_events in ((1, 1 << 18), (1, 2), (40, 2)):
         assert not differences(whole, read_in_pieces(trace, most_bytes, most_events))
-
-
-def test_buffers_that_are_no_longer_in_use_are_used_again() -> None:
-    """Columns of a batch may be made while the packets after it are loaded."""
-    loader = Loader()
-    loader.load([])
-    first = loader.memory
-    loader.load([])
-    second = loader.memory
-    assert second.data is not first.data
-    room = first.data
-    del first
-    gc.collect()
-    loader.load([])
-    assert loader.memory.data is room
-    assert loader.memory.data is not second.data
 
 
 def test_large_packets_are_read_piece_by_piece(
