@@ -35,6 +35,8 @@ help:
 	@echo 'make bench   speed and memory of reading and ingesting, beside Babeltrace 2'
 	@echo 'make truth   precision and recall on systems with known truth: a sample of the day'
 	@echo 'make real    the same on real ROS 2: nodes of rclpy, recorded with LTTng'
+	@echo 'make planted which of the faults that are built into a real robot are found, and blamed'
+	@echo 'make ros     what only real ROS 2 needs: rclpy, LTTng, perf'
 	@echo 'make fuzz    damaged traces, archives, databases and files through all of msgflow'
 	@echo 'make mutants changes SQL rules one place at a time, and says what no test notices; hours'
 	@echo 'make docs    the documentation as a site, in .site; fails at a dead link'

@@ -1,4 +1,4 @@
-"""`msgflow fleet`: many recordings in one lake."""
+"""Many recordings, on one machine or many, into one lake of Parquet files."""
 
 from __future__ import annotations
 
@@ -345,7 +345,7 @@ def compare(
         case: Flows that count: first or last arrival of each root, newest root of each arrival, or
             all.
         confidence: Confidence level of the intervals.
-        at_least: Smallest change that matters: less is about equal.
+        at_least (CHANGE): Smallest change that matters: less is about equal.
     """
     from msgflow.fleet.compare import compare as compared
 

@@ -1,4 +1,4 @@
-"""`msgflow flow`: the way of one message as a tree: where it came from, and where it went."""
+"""Print the flow of one message: what caused it, and what it caused."""
 
 from __future__ import annotations
 
@@ -54,9 +54,7 @@ def command(
     output: Path | None = None,
     **asked: Any,
 ) -> None:
-    """Print the flow of one message: what caused it, and what it caused.
-
-    A line is a publication, a taken message with its callback, a request, or a response that its
+    """A line is a publication, a taken message with its callback, a request, or a response that its
     client took.
 
     Times count from the first line. NA means that the trace does not show it.

@@ -1,4 +1,4 @@
-"""`msgflow report`: the pages of a run in one file, or its summary as Markdown."""
+"""Write the pages of a run to one file that any browser opens, without a server."""
 
 from __future__ import annotations
 
@@ -29,9 +29,7 @@ def command(
     where: str | None = None,
     **asked: Any,
 ) -> None:
-    """Write the pages of a run to one file that any browser opens, without a server.
-
-    The first page is a summary. A file that ends with .md gets the summary alone, as Markdown.
+    """The first page is a summary. A file that ends with .md gets the summary alone, as Markdown.
     With --lake: a page of the paths of all its runs by label over time, outliers, failures.
 
     Args:

@@ -1,4 +1,4 @@
-"""`msgflow ui`: the pages of a database in the browser."""
+"""Show the database in the browser: timeline, paths, graph, executors, comparison."""
 
 from __future__ import annotations
 
@@ -30,9 +30,7 @@ def command(
     where: str | None = None,
     database: Path = DEFAULT_DATABASE,
 ) -> None:
-    """Show the database in the browser: timeline, paths, graph, executors, comparison.
-
-    With --lake: paths of all runs of a lake by label over time, outliers, failures.
+    """With --lake: paths of all runs of a lake by label over time, outliers, failures.
 
     The printed address contains a token; without it, nothing is shown. The server answers this
     machine only: from another one, open the same address through ssh -L. Ctrl-C stops it. While it
