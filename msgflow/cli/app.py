@@ -140,16 +140,19 @@ def _summary(name: str) -> str:
 def _imported(name: str, words: list[str]) -> Any:
     is_own = name in COMMANDS
     module = import_module(f"msgflow.cli.{name}") if is_own else _loaded(name)
-    if (asked := getattr(module, "asked", None)) and (found := asked(words)):
-        return found
+    members = vars(module)
+    if "asked" in members:
+        query = module.asked(words)
+        if query is not None:
+            return query
+    summary = [_summary(name)] if is_own else []
     around = typer.Typer(add_completion=False)
     around.callback()(lambda: None)
-    summary = [_summary(name)] if is_own else []
-    if hasattr(module, "app"):
+    if "app" in members:
         around.add_typer(module.app, name=name, help="".join(summary) or None)
     else:
         text = "\n\n".join([*summary, getdoc(module.command) or ""])
-        around.command(name, cls=getattr(module, "Command", None), help=text)(module.command)
+        around.command(name, cls=members.get("Command"), help=text)(module.command)
     return lay_out_help(typer.main.get_group(around).commands[name])
 
 

@@ -39,9 +39,14 @@ def table(
     """Define a table of `store`; its rows belong to runs, which stand behind their identities."""
     if of_run:
         run = reference("run_id", "Run that the row belongs to", required=True)
-        place = int(columns[0].name == f"{name}_id")
-        columns = (*columns[:place], run, *columns[place:])
-    info = {} if view is None else {"view": view, **({"computed": computed} if computed else {})}
+        first, *others = columns
+        has_identity = first.name == f"{name}_id"
+        columns = (first, run, *others) if has_identity else (run, *columns)
+    info: dict[str, Any] = {}
+    if view is not None:
+        info["view"] = view
+        if computed:
+            info["computed"] = computed
     Table(name, STORE, *columns, comment=comment, info=info)
 
 
@@ -56,14 +61,18 @@ def column(
     **info: str | bool | None,
 ) -> Column[Any]:
     """Return a column, whose default is an expression of SQL; `info` as above, None for nothing."""
-    unit = info.get("unit")
+    keys = []
+    if to is not None:
+        keys.append(ForeignKey(f"{STORE.schema}.{to}"))
+    if info.get("unit") is not None:
+        comment = f"{comment} [{info['unit']}]"
     return Column(
         name,
         type_,
-        *([] if to is None else [ForeignKey(f"{STORE.schema}.{to}")]),
+        *keys,
         nullable=not required,
         server_default=None if default is None else expression(default),
-        comment=comment if unit is None else f"{comment} [{unit}]",
+        comment=comment,
         info={key: value for key, value in info.items() if value is not None},
     )
 
