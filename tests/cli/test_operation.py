@@ -104,8 +104,11 @@ def test_a_command_asks_a_method_of_the_database(monkeypatch: pytest.MonkeyPatch
         typer.echo((found, output, loud))
 
     found: dict[str, Any] = {
-        "path": Path("x.duckdb"), "output": Path("here"), "run": "all", "paths": Path("paths.yaml"),
-    }  # fmt: skip
+        "path": Path("x.duckdb"),
+        "output": Path("here"),
+        "run": "all",
+        "paths": Path("paths.yaml"),
+    }
     assert asked(written, "--db=x.duckdb") == str((found, Path("here"), False))
     given = found | {"output": Path("there"), "run": "1", "end": "3"}
     words = ("--db=x.duckdb", "-o", "there", "--run=1", "--end=3", "--loud")
