@@ -15,7 +15,6 @@ too.
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
 from copy import copy
 from inspect import Parameter, Signature, signature
 from pathlib import Path
@@ -44,12 +43,14 @@ _METAVARS = {int: "NUMBER", float: "NUMBER", str: "TEXT"}
 
 def operation(function: Command) -> Command:
     """Return a command that calls a function, in which Typer finds its parameters and its help."""
-    opened = [name for name, hint in function.__annotations__.items() if hint == "Database"]
+    has_database = function.__annotations__.get("database") == "Database"
 
     def command(*given: Any, **named: Any) -> None:
-        with ExitStack() as stack:
-            databases = {name: stack.enter_context(Database(named[name])) for name in opened}
-            function(*given, **named | databases)
+        if not has_database:
+            function(*given, **named)
+            return
+        with Database(named.pop("database")) as database:
+            function(*given, database=database, **named)
 
     return _described(command, list(parameters_of(function)), _help(function))
 
@@ -65,9 +66,9 @@ def extends(method: Callable[..., Any]) -> Callable[[Command], Command]:
         asked = list(parameters_of(method, skipped=("self", *(each.name for each in own))))
 
         def command(**given: Any) -> None:
-            words = {each.name: given[each.name] for each in own}
-            with Database(given["database"]) as opened:
-                function(**words | {"database": opened}, **_said(given, asked))
+            words = {each.name: given[each.name] for each in own if each.name != "database"}
+            with Database(given["database"]) as database:
+                function(database=database, **words, **_said(given, asked))
 
         return _described(command, [*asked, *own], _help(function))
 
