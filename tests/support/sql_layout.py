@@ -276,19 +276,23 @@ def _shorten(layout: Layout, first: int, last: int) -> None:
 
 
 def _break(layout: Layout, start: int, stop: int) -> None:
-    """Break a line before the last place that leaves it short enough, of those least deep."""
+    """Break a line before the last place that leaves it short enough, of those least deep.
+
+    A clause goes before all others.
+    """
     depth = 0
-    choices: list[tuple[int, int]] = []
+    choices: list[tuple[int, bool, int]] = []
     for place in range(start, stop + 1):
         token = layout.tokens[place]
         depth -= token in (")", "]", "}")
-        may_break = token in BREAKS or layout.tokens[place - 1] in (",", "(")
+        is_clause = layout.is_clause(place)
+        may_break = is_clause or token in BREAKS or layout.tokens[place - 1] in (",", "(")
         if place > start and may_break and _width(layout, start, place - 1) <= WIDTH:
-            choices.append((-depth, place))
+            choices.append((-depth, is_clause, place))
         depth += token in ("(", "[", "{")
     if choices:
-        _, place = max(choices)
-        layout.break_before(place, layout.indent(start) + INDENT)
+        _, is_clause, place = max(choices)
+        layout.break_before(place, layout.indent(start) + (0 if is_clause else INDENT))
 
 
 def fixed(sql: str) -> str:
