@@ -12,13 +12,15 @@ from __future__ import annotations
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from itertools import permutations
 from typing import TYPE_CHECKING
 
 from rich.cells import cell_len
 
 from msgflow.result.rows import is_number
 from msgflow.text.values import ARROW, MOMENT, NULL, column_title, format_cell, short_symbol
-from msgflow.text.wrapping import longest_piece, longest_word
+from msgflow.text.wrapping import longest_piece, longest_word, wrap
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -318,15 +320,39 @@ def _least_width(columns: list[ShownColumn]) -> int:
 
 
 def _widths(columns: list[ShownColumn], width: int) -> list[int]:
-    """Return widths with which the columns fit."""
+    """Return widths with which the columns fit and the rows take few lines."""
     widths = [column.width for column in columns]
     free = width - GAP * (len(columns) - 1)
     if sum(widths) <= free:
         return widths
-    # The widest columns become narrower.
+    # First the widest columns become narrower; then columns trade cells.
     while sum(widths) > free:
         wide = [place for place, column in enumerate(columns) if widths[place] > column.least]
         widths[max(wide, key=widths.__getitem__)] -= 1
+    return _balanced(columns, widths)
+
+
+def _balanced(columns: list[ShownColumn], widths: list[int]) -> list[int]:
+    """Return widths of the same sum with which the rows take the fewest lines."""
+    texts = [place for place, column in enumerate(columns) if not column.is_number]
+    first = [column.cells[:MOST_ROWS] for column in columns]
+    heights = cache(lambda place, width: [len(wrap(cell, width)) for cell in first[place]])
+
+    def lines(tried: list[int]) -> int:
+        return sum(map(max, zip(*(heights(place, tried[place]) for place in texts), strict=True)))
+
+    best = lines(widths)
+    improves = len(texts) > 1
+    while improves:
+        improves = False
+        for giver, taker in permutations(texts, 2):
+            for cells in range(1, widths[giver] - columns[giver].least + 1):
+                tried = list(widths)
+                tried[giver] -= cells
+                tried[taker] += cells
+                if tried[taker] <= columns[taker].width and (count := lines(tried)) < best:
+                    best, widths, improves = count, tried, True
+                    break
     return widths
 
 

@@ -322,6 +322,15 @@ def test_names_are_broken_for_the_six_most_important_columns_alone() -> None:
     assert "p95" in titles_of(callbacks("/a", "/b"), 100)
 
 
+def test_widths_are_those_with_which_rows_take_few_lines() -> None:
+    nodes = ("/perception", "/localization_of_a_robot", "/localization/state_estimator")
+    lines = lines_of(callbacks(*nodes), 100)
+    # The last node is broken in any case, and takes no more room from the callbacks than it needs.
+    assert lines[2].startswith("/perception               Subscription(/perception/topic)  ")
+    assert lines[5].startswith("/localization             Subscription(/localization  ")
+    assert not lines[7].startswith((" ", "/"))
+
+
 def test_short_text_is_not_broken_for_a_less_important_column() -> None:
     rows = [
         {
