@@ -35,6 +35,8 @@ help:
 	@echo 'make bench   speed and memory of reading and ingesting, beside Babeltrace 2'
 	@echo 'make truth   precision and recall on systems with known truth: a sample of the day'
 	@echo 'make real    the same on real ROS 2: nodes of rclpy, recorded with LTTng'
+	@echo 'make planted whether msgflow why names the problems that were planted in a robot'
+	@echo 'make ros     install what tests with real ROS 2 need: rclpy, LTTng, perf'
 	@echo 'make fuzz    damaged traces, archives, databases and files through all of msgflow'
 	@echo 'make mutants changes SQL rules one place at a time, and says what no test notices; hours'
 	@echo 'make docs    the documentation as a site, in .site; fails at a dead link'

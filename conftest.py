@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import lzma
+import resource
 import shutil
 import signal
 import sys
@@ -92,7 +93,11 @@ def pytest_testnodedown(node: Any) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Say how many tests `make test` leaves to `make test-all`."""
+    """Say what the tests cost, and how many `make test` leaves to `make test-all`."""
+    # Workers are children, and so is what they started: all have ended.
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    seconds = sum(each.ru_utime + each.ru_stime for each in used)
+    terminalreporter.write_line(f"{seconds:,.0f} s of CPU")
     config = terminalreporter.config
     count = config.stash.get(_LEFT_OUT, 0)
     if count and config.option.markexpr == _QUICK:

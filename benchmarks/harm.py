@@ -90,8 +90,11 @@ def run(given: argparse.Namespace, environment: dict[str, str]) -> Ended:
     """Run a robot for some seconds."""
     ended = subprocess.run(
         [given.python, _ROBOT, str(given.seconds), "1"],
-        env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True,
-    )  # fmt: skip
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
     callbacks = ended.stdout.splitlines()
     # What ROS logs begins with its level and a time.
     errors = [line for line in ended.stderr.splitlines() if not line.startswith("[")]
@@ -106,12 +109,15 @@ def costs(given: argparse.Namespace, environment: dict[str, str], directory: Pat
             stack.enter_context(
                 subprocess.Popen(
                     [given.python, _ROBOT, "0", str(given.calls)],
-                    env=each, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                    env=each,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    text=True,
                     stderr=subprocess.DEVNULL,
                 )
             )
             for each in (environment, traced)
-        ]  # fmt: skip
+        ]
         for robot in robots:
             stack.callback(robot.kill)
             assert robot.stdout is not None

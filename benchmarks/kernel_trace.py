@@ -25,13 +25,18 @@ _CONTENT_BYTES = 200_000
 _HEADER = [("id", "<u2"), ("time", "<u4")]
 _RECORDS = {
     "sched_switch": [
-        ("prev_comm", "S16"), ("prev_tid", "<i4"), ("prev_prio", "<i4"), ("prev_state", "<i8"),
-        ("next_comm", "S16"), ("next_tid", "<i4"), ("next_prio", "<i4"),
+        ("prev_comm", "S16"),
+        ("prev_tid", "<i4"),
+        ("prev_prio", "<i4"),
+        ("prev_state", "<i8"),
+        ("next_comm", "S16"),
+        ("next_tid", "<i4"),
+        ("next_prio", "<i4"),
     ],
     "sched_waking": [("comm", "S16"), ("tid", "<i4"), ("prio", "<i4"), ("target_cpu", "<i4")],
     "irq_softirq_entry": [("vec", "<u4")],
     "irq_softirq_exit": [("vec", "<u4")],
-}  # fmt: skip
+}
 _SWITCH, _WAKING, _ENTRY, _EXIT = range(4)
 _OTHERS = 300  # threads of other processes
 _OWN = 2_000  # how long before its first event a thread gets the CPU [ns]

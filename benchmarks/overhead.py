@@ -72,10 +72,13 @@ class Chain:
         self._nodes = [
             subprocess.Popen(
                 [python, _CHAIN, str(number), str(_HOPS), str(domain), str(work)],
-                env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                env=environment,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
             )
             for number in range(_HOPS + 1)
-        ]  # fmt: skip
+        ]
         for node in self._nodes:
             assert node.stdout is not None
             node.stdout.readline()
@@ -195,8 +198,10 @@ def report(blocks: dict[str, list[Block]], draws: random.Random) -> None:
     """Print a row for each kind."""
     base = blocks[_NOTHING]
     print(f"{len(base)} rounds, {len(base[0].latencies_ns)} messages of each kind in each")
-    print("| recorded | median | difference of medians | of means | CPU per message | events | "
-          "bytes per event | ns of CPU per event |")  # fmt: skip
+    print(
+        "| recorded | median | difference of medians | of means | CPU per message | events | "
+        "bytes per event | ns of CPU per event |"
+    )
     print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     for kind, some in sorted(blocks.items(), key=lambda item: item[0] != _NOTHING):
         median = statistics.median(_latencies(some)) / 1e6
@@ -211,9 +216,14 @@ def report(blocks: dict[str, list[Block]], draws: random.Random) -> None:
             cells.append(_difference(base, some, _cpu, draws, 1e6, "ms"))
             more = cpu - _cpu(base)
             cells += (
-                [f"{events:.0f}", f"{statistics.mean(one.bytes for one in some) / events:.0f}",
-                 f"{more / events:.0f}"] if events else ["", "", ""]
-            )  # fmt: skip
+                [
+                    f"{events:.0f}",
+                    f"{statistics.mean(one.bytes for one in some) / events:.0f}",
+                    f"{more / events:.0f}",
+                ]
+                if events
+                else ["", "", ""]
+            )
         print(f"| {' | '.join(cells)} |")
 
 

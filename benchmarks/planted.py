@@ -45,9 +45,11 @@ def main() -> None:
     parser.add_argument("--python", type=Path, help="Python with rclpy: run the robot, too")
     parser.add_argument("--only", action="append", help="problems, with + between; all when none")
     parser.add_argument(
-        "--to", type=Path, default=Path("build/planted"),
+        "--to",
+        type=Path,
+        default=Path("build/planted"),
         help="directory for a folder of each recording, which replaces that of an earlier run",
-    )  # fmt: skip
+    )
     arguments = parser.parse_args()
     planted = [tuple(one.split("+")) for one in arguments.only or ()]
     bad = 0

@@ -36,9 +36,11 @@ def main() -> None:
     parser.add_argument("--system", action="append", help="one of the systems; all when none")
     parser.add_argument("--seconds", type=float, default=5, help="how long each runs")
     parser.add_argument(
-        "--to", type=Path, default=Path("build/real"),
+        "--to",
+        type=Path,
+        default=Path("build/real"),
         help="directory for a folder of each system, which replaces that of an earlier run",
-    )  # fmt: skip
+    )
     parser.add_argument(
         "--python-nodes", action="store_true", help="trace callbacks and executors of rclpy, too"
     )

@@ -163,17 +163,31 @@ EVERY_FAULT = ("loss", "packets", "truncated", "rotated", "chunk_missing")
 # Where losses meet threads that move, and messages that come twice.
 GAP_SYSTEMS = ("container", "container_multi_threaded")
 GAP_RECORDINGS = (
-    "brim", "one_cpu", "late_one_cpu", "pause", "stopped_at_rotation", "snapshots", "last_snapshot",
-)  # fmt: skip
+    "brim",
+    "one_cpu",
+    "late_one_cpu",
+    "pause",
+    "stopped_at_rotation",
+    "snapshots",
+    "last_snapshot",
+)
 # Links found by time alone depend on how stamps and the trace's clock differ.
 TIMED_LAYOUTS = ("humble", "iron")
 TIMED_SYSTEMS = ("bursts", "bursts_two_hosts")
 # In these layouts, recordings ten times as long show more: messages that wait behind a gap, copies,
 # and stretches of time in which the clocks differ otherwise.
 LONG_SYSTEMS = (
-    "channels", "container", "host_chain", "layers", "losses", "mixed_intra_process",
-    "overwritten_copies", "polled", "rivals", "services",
-)  # fmt: skip
+    "channels",
+    "container",
+    "host_chain",
+    "layers",
+    "losses",
+    "mixed_intra_process",
+    "overwritten_copies",
+    "polled",
+    "rivals",
+    "services",
+)
 LONG_RECORDINGS = ("loss", "lost_begin", "steps")
 # Steps cost these more: only other hosts take what host_chain publishes, in three seconds; polled
 # lasts two seconds, half a second of them before a step.
@@ -183,9 +197,15 @@ KERNEL_SYSTEMS = ("cpu_hog", "real_time", "shared_map", "shared_memory", "kernel
 # What comes and goes in these does so after a second; clocks that drift, or are known from few
 # messages, take one to be known.
 WHOLE = (
-    "losses", "restarts", "container_restarts", "host_chain", "services", "actions", "stall",
+    "losses",
+    "restarts",
+    "container_restarts",
+    "host_chain",
+    "services",
+    "actions",
+    "stall",
     *KERNEL_SYSTEMS,
-)  # fmt: skip
+)
 # The truth names hosts as their traces do: holes of one would be looked for in the other.
 ONE_NAME = {"containers_one_hostname"}
 QUICK = (("pipeline", "jazzy"), ("two_hosts", "humble-fastdds"))

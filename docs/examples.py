@@ -25,9 +25,14 @@ from pathlib import Path
 HERE = Path(__file__).parent
 QUERIES = sorted((HERE / "queries").glob("*.md"))
 PAGES = (
-    "why-late.md", "tour.md", "cookbook.md", "own-events.md", "scheduling.md", "../README.md",
+    "why-late.md",
+    "tour.md",
+    "cookbook.md",
+    "own-events.md",
+    "scheduling.md",
+    "../README.md",
     *(f"queries/{page.name}" for page in QUERIES),
-)  # fmt: skip
+)
 # What pages without a setup of their own start from: two hosts.
 DEMO = """\
 msgflow simulate demo -o trace

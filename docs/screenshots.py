@@ -67,15 +67,19 @@ PICTURES = (
     Picture("graph", "demo", 0.3, "graph", "", 800, "dark"),
     Picture("autoware_flow", "autoware", 0.2, "", "/FrontLidarDriver", 1580),
     Picture(
-        "autoware_executors", "autoware", 0.2,
-        f"timeline?from={{from}}&to={{to}}&{EXECUTORS_ALONE}", "/FrontLidarDriver", 740,
+        "autoware_executors",
+        "autoware",
+        0.2,
+        f"timeline?from={{from}}&to={{to}}&{EXECUTORS_ALONE}",
+        "/FrontLidarDriver",
+        740,
     ),
     Picture("rtabmap_messages", "rtabmap", 0.3, "timeline?from={from}&to={to}", _MAP, 1000),
     Picture("real_overview", "pipeline", 0, "overview", "", 760),
     Picture("real_slowest", "pipeline", 0, "timeline?from={from}&to={to}", "slowest", 620, "dark"),
     Picture("topics", "overload", 1, "topics", "", 560),
     Picture("rtabmap_flow", "rtabmap", 0.3, "", _MAP, 860, "dark"),
-)  # fmt: skip
+)
 
 
 def database(directory: Path, picture: Picture) -> Path:

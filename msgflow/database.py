@@ -337,7 +337,7 @@ class Database:
 
         Args:
             bag (BAG): directory of a rosbag2, or one of its files (.mcap, .db3).
-            run: a name or an id; the latest run when None.
+            run: a name or an id; by default the latest run.
 
         Returns:
             A row per topic of the bag: how many messages were joined, and why others were not.
@@ -664,7 +664,7 @@ class Database:
             case: 'first' or 'last' arrival of each root, 'newest' root of each arrival, or
                 'every_pair'.
             explain: what the changes of paths consist of, by node and part.
-            at_least: less than that is about equal.
+            at_least (CHANGE): less than that is about equal.
             skip_first: seconds of warm-up to leave out.
             confidence: of the intervals, between 0 and 1.
             resamples: behind the intervals, at least 20 / (1 - confidence), by default at least
@@ -782,7 +782,7 @@ class Database:
             compare: another run to compare it with.
             targets: requirements, as YAML: the summary has the verdicts on them.
             paths: the file with the paths that have names.
-            through: only paths with this text in them: a topic, or a node.
+            through (NAME): only paths with this text in them: a topic, or a node.
             max_size: most bytes of the file; the page says what it leaves out to fit.
             **part: what to read, see `msgflow.Slice`; one run.
 

@@ -31,8 +31,15 @@ _UNTRACED = {"mixed": {"filter"}}
 _UNTIL_LATE = 2.0
 _ROBOT_NODES = _NODES.parents[1] / "robot" / "real.py"
 _ROBOT = (
-    "lidar", "camera", "filter", "detector", "localization", "map_server", "planner", "control",
-)  # fmt: skip
+    "lidar",
+    "camera",
+    "filter",
+    "detector",
+    "localization",
+    "map_server",
+    "planner",
+    "control",
+)
 _LATE_ROBOT = 4
 
 

@@ -27,9 +27,14 @@ from msgflow_sim.system import Executor, Group, Host, KernelTrace, Load, Node, P
 
 _LOAD = Load("backup", 7101, period_ns=500 * MILLISECOND, busy_ns=3 * MILLISECOND, cpus=(3,))
 _HOG = Load(
-    "compressor", 7001, period_ns=220 * MILLISECOND, busy_ns=90 * MILLISECOND, priority=79,
-    cpus=(0,), start_ns=100 * MILLISECOND,
-)  # fmt: skip
+    "compressor",
+    7001,
+    period_ns=220 * MILLISECOND,
+    busy_ns=90 * MILLISECOND,
+    priority=79,
+    cpus=(0,),
+    start_ns=100 * MILLISECOND,
+)
 
 
 def robot(problems: Collection[str]) -> Scenario:
@@ -39,31 +44,74 @@ def robot(problems: Collection[str]) -> Scenario:
         description="A robot of ten nodes in eight processes.",
         hosts=(
             Host(
-                "robot", cpu_count=4,
+                "robot",
+                cpu_count=4,
                 kernel=KernelTrace((_LOAD, _HOG) if "hog" in problems else (_LOAD,)),
             ),
         ),
         processes=(
             Process("lidar", "robot", 1101, (_sensor("lidar", "/scan", 200),), cpus=(1,)),
-            Process("camera", "robot", 1201, (_sensor("camera", "/image", 50),),
-                    start_ns=40 * MILLISECOND, cpus=(2,)),
-            Process("filter", "robot", 1301, (_filter("slow" in problems),),
-                    start_ns=110 * MILLISECOND, cpus=(3,)),
-            Process("detector", "robot", 1401, (_detector("queue" in problems),),
-                    start_ns=190 * MILLISECOND, cpus=(2,)),
-            Process("localization", "robot", 1501, (_localizer(), _monitor("busy" in problems)),
-                    start_ns=260 * MILLISECOND, cpus=(0,)),
-            Process("map_server", "robot", 1601, (_map_server("service" in problems),),
-                    start_ns=330 * MILLISECOND, cpus=(1,)),
-            Process("planner", "robot", 1701, (_planner("service" in problems),),
-                    start_ns=(4 * SECOND if "late" in problems else 400 * MILLISECOND),
-                    executors=(Executor(), Executor("nested")), cpus=(3,)),
-            Process("control", "robot", 1801, (_controller("stale" in problems), _motors()),
-                    start_ns=480 * MILLISECOND, cpus=(1,)),
+            Process(
+                "camera",
+                "robot",
+                1201,
+                (_sensor("camera", "/image", 50),),
+                start_ns=40 * MILLISECOND,
+                cpus=(2,),
+            ),
+            Process(
+                "filter",
+                "robot",
+                1301,
+                (_filter("slow" in problems),),
+                start_ns=110 * MILLISECOND,
+                cpus=(3,),
+            ),
+            Process(
+                "detector",
+                "robot",
+                1401,
+                (_detector("queue" in problems),),
+                start_ns=190 * MILLISECOND,
+                cpus=(2,),
+            ),
+            Process(
+                "localization",
+                "robot",
+                1501,
+                (_localizer(), _monitor("busy" in problems)),
+                start_ns=260 * MILLISECOND,
+                cpus=(0,),
+            ),
+            Process(
+                "map_server",
+                "robot",
+                1601,
+                (_map_server("service" in problems),),
+                start_ns=330 * MILLISECOND,
+                cpus=(1,),
+            ),
+            Process(
+                "planner",
+                "robot",
+                1701,
+                (_planner("service" in problems),),
+                start_ns=(4 * SECOND if "late" in problems else 400 * MILLISECOND),
+                executors=(Executor(), Executor("nested")),
+                cpus=(3,),
+            ),
+            Process(
+                "control",
+                "robot",
+                1801,
+                (_controller("stale" in problems), _motors()),
+                start_ns=480 * MILLISECOND,
+                cpus=(1,),
+            ),
         ),
         layout="kilted",
         overwrites=True,
-    )  # fmt: skip
+    )
 
 
 def _sensor(name: str, topic: str, period_ms: int) -> Node:

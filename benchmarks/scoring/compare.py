@@ -152,9 +152,20 @@ def _excused(connection: duckdb.DuckDBPyConnection, excused: int) -> Score:
     wrong = max(excused - allowed, 0)
     precision = 1 - wrong / excused if excused else 1.0
     return Score(
-        "excused", pairs or 0, 0, excused, wrong, 0, 0, 0, 0, 0, precision, 1.0,
+        "excused",
+        pairs or 0,
+        0,
+        excused,
+        wrong,
+        0,
+        0,
+        0,
+        0,
+        0,
+        precision,
+        1.0,
         f"at most {allowed}",
-    )  # fmt: skip
+    )
 
 
 def _lost(connection: duckdb.DuckDBPyConnection) -> Score:

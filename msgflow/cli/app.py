@@ -9,7 +9,9 @@ from __future__ import annotations
 import sys
 from importlib import import_module
 from importlib.metadata import entry_points
+from inspect import getdoc
 from itertools import takewhile
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -17,48 +19,44 @@ from typer.core import TyperCommand, TyperGroup
 
 from msgflow.cli.completion import is_completing
 from msgflow.cli.errors import print_exception
-from msgflow.cli.options import plain, plain_help
+from msgflow.cli.help import lay_out_help
 from msgflow.cli.output import discard_stdout, print_error
 from msgflow.cli.signals import HANDLER
 from msgflow.errors import ExitCode, UsageError, require_utf8
 from msgflow.sql.interrupt import Terminated
 from msgflow.version import __version__
 
-COMMANDS = {
-    "record": (
-        "Record a ROS 2 system with LTTng, then print what is wrong and how long messages took."
-    ),
-    "watch": "See a ROS 2 system while it runs: latency of every path, window by window.",
-    "ingest": "Read LTTng traces of a ROS 2 system into a database, each recording as a run.",
-    "query": "Run a named query; `msgflow query NAME --help` explains it.",
-    "why": "Explain why a topic is late: who is to blame, where the time goes, what to ask next.",
-    "flow": "Print the flow of one message: what caused it, and what it caused.",
-    "graph": "Write the graph of nodes, topics, services and actions, with rates and latencies.",
-    "ui": "Show the database in the browser: timeline, paths, graph, executors, comparison.",
-    "report": "Write the pages of a run to one file that any browser opens, without a server.",
-    "compare": "Compare run B with run A, or two times of one run, with what chance explains.",
-    "verify": "Check a run against a file of requirements: passed, failed, not measured, no data.",
-    "sql": "Run SQL on the public views, read-only and without access to other files.",
-    "info": (
-        "Print what a database holds: runs, hosts, processes, nodes, topics, counts, data quality."
-    ),
-    "check": "Show what is wrong with a recording, with cause and cure; exit code 1 on errors.",
-    "runs": "List, rename, label and remove runs; without a command: list.",
-    "links": "Declare indirect links: how nodes use messages they keep; without a command: list.",
-    "suggest": "Write links, paths or requirements that a run shows, as a file to review.",
-    "clocks": "Synchronise the clocks of several hosts; without a command: show.",
-    "export": "Write the content of a database to files.",
-    "events": "List the events of any CTF traces in order of time.",
-    "bag": "Join the messages of a bag to their publications: size, header.stamp, frame_id.",
-    "db": "Upgrade and describe a database file.",
-    "fleet": "Many recordings, on one machine or many, into one lake of Parquet files.",
-    "mcp": "Serve the database to an agent, over stdin and stdout (Model Context Protocol).",
-}
-"""The commands in the order in which a user needs them, with their summaries in the help.
+COMMANDS = (
+    "record",
+    "watch",
+    "ingest",
+    "query",
+    "why",
+    "flow",
+    "graph",
+    "ui",
+    "report",
+    "compare",
+    "verify",
+    "sql",
+    "info",
+    "check",
+    "runs",
+    "links",
+    "suggest",
+    "clocks",
+    "export",
+    "events",
+    "bag",
+    "db",
+    "fleet",
+    "mcp",
+)
+"""The commands in the order in which a user needs them.
 
-Each is a module of `msgflow.cli` with a function `command`, or a group `app`. Its class `Command`,
-if it has one, reads the words of the function. Its function `asked` returns the command of a query
-if the words behind the name ask that.
+Each is a module of `msgflow.cli`, whose first sentence is the summary in the help. It has a
+function `command`, or a group `app`. Its class `Command`, if it has one, reads the words of the
+function. Its function `asked` returns the command of a query if the words behind the name ask that.
 """
 _MORE = frozenset(("bag", "db", "events", "fleet", "mcp", "simulate"))
 """What users of one robot rarely need: it has a panel of its own in the help."""
@@ -71,11 +69,8 @@ class RootGroup(TyperGroup):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**options)
-        self.commands = {name: _listed(name, summary) for name, summary in COMMANDS.items()}
-
-    def get_help_option(self, ctx: Any) -> Any:
-        """Return --help, which takes nothing."""
-        return plain(super().get_help_option(ctx))
+        self.commands = {name: _listed(name, _summary(name)) for name in COMMANDS}
+        lay_out_help(self)
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of all commands, those of other distributions last."""
@@ -98,9 +93,7 @@ class RootGroup(TyperGroup):
                 hint = " or ".join(header.command for header in meant)
                 raise UsageError(f"there is no such command — {args[0]}", hint)
         name, summary, rest = super().resolve_command(ctx, args)
-        command = summary and _imported(str(name), rest)
-        plain_help(command or self, ctx)
-        return name, command, rest
+        return name, summary and _imported(str(name), rest), rest
 
     def main(self, *args: Any, **options: Any) -> None:
         """Run a command line; an exception becomes a message and an exit code."""
@@ -138,17 +131,29 @@ def _listed(name: str, summary: str | None) -> TyperCommand:
     return TyperCommand(name, help=summary, rich_help_panel="More" if name in _MORE else None)
 
 
+def _summary(name: str) -> str:
+    """Return the first sentence of the module of a command, without importing it."""
+    text = Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8")
+    return text.split('"""')[1].partition("\n\n")[0]
+
+
 def _imported(name: str, words: list[str]) -> Any:
-    module = import_module(f"msgflow.cli.{name}") if name in COMMANDS else _loaded(name)
-    if (asked := getattr(module, "asked", None)) and (found := asked(words)):
-        return found
+    is_own = name in COMMANDS
+    module = import_module(f"msgflow.cli.{name}") if is_own else _loaded(name)
+    members = vars(module)
+    if "asked" in members:
+        query = module.asked(words)
+        if query is not None:
+            return query
+    summary = [_summary(name)] if is_own else []
     around = typer.Typer(add_completion=False)
     around.callback()(lambda: None)
-    if hasattr(module, "app"):
-        around.add_typer(module.app, name=name, help=COMMANDS.get(name))
+    if "app" in members:
+        around.add_typer(module.app, name=name, help="".join(summary) or None)
     else:
-        around.command(name, cls=getattr(module, "Command", None))(module.command)
-    return typer.main.get_group(around).commands[name]
+        text = "\n\n".join([*summary, getdoc(module.command) or ""])
+        around.command(name, cls=members.get("Command"), help=text)(module.command)
+    return lay_out_help(typer.main.get_group(around).commands[name])
 
 
 def _loaded(name: str) -> Any:
@@ -190,4 +195,4 @@ def root(
 ) -> None:
     """Print the help where no command is given."""
     if context.invoked_subcommand is None:
-        context.get_help()
+        typer.echo(context.get_help())

@@ -1,4 +1,4 @@
-"""`msgflow bag`: the messages of a bag of the same run."""
+"""Join the messages of a bag to their publications: size, header.stamp, frame_id."""
 
 from __future__ import annotations
 

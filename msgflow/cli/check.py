@@ -1,4 +1,4 @@
-"""`msgflow check`: what is wrong with a recording, numbered, with cause and cure."""
+"""Show what is wrong with a recording, with cause and cure; exit code 1 on errors."""
 
 from __future__ import annotations
 
@@ -37,10 +37,9 @@ def command(
     form: Format | None = None,
     output: Path | None = None,
 ) -> None:
-    """Show what is wrong with a recording, with cause and cure; exit code 1 on errors.
+    """With warnings only, the exit code is 0.
 
-    With warnings only, the exit code is 0. If a run has several clocks, the last line says how far
-    their times can be compared.
+    If a run has several clocks, the last line says how far their times can be compared.
 
     Args:
         detail: Also what is worth knowing but not wrong, what the database breaks now, and what

@@ -1,4 +1,4 @@
-"""`msgflow clocks`: the clocks of several hosts."""
+"""Synchronise the clocks of several hosts; without a command: show."""
 
 from __future__ import annotations
 

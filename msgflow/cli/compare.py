@@ -1,4 +1,4 @@
-"""`msgflow compare`: differences of two runs, and conditions under which they fail."""
+"""Compare run B with run A, or two times of one run, with what chance explains."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`msgflow db`: the database file itself."""
+"""Upgrade and describe a database file."""
 
 from __future__ import annotations
 

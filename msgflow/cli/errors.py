@@ -13,7 +13,7 @@ from msgflow.cli.output import discard_stdout, print_error
 from msgflow.errors import ExitCode, MsgflowError
 from msgflow.version import __version__
 
-# What to do in place of an option or a value that a command does not have.
+# What to do in place of an option or a value of other commands, or other programs.
 _INSTEAD = {
     # Results go to `-o FILE` everywhere. An ingest has none: it writes to the database.
     ("msgflow ingest", "-o"): "--db FILE names the database",
@@ -21,23 +21,8 @@ _INSTEAD = {
     ("msgflow export otlp", "--endpoint"): (
         "write a file with -o: Jaeger opens it, and a collector sends it on (docs/export.md)"
     ),
-    ("msgflow export", "series"): (
-        "msgflow query flows --times relative -o FILE.csv; for PlotJuggler msgflow export mcap"
-    ),
     ("", "--skip-first"): "--start SECONDS",
     ("", "--memory-limit"): "MSGFLOW_MEMORY_LIMIT in the environment",
-    ("msgflow query", "--list"): "msgflow query",
-    ("msgflow query critical-path", "--take"): "msgflow flow --take ID --why",
-    ("msgflow clocks", "pairs"): "msgflow clocks --by pair",
-    ("msgflow fleet", "pack"): "msgflow fleet remove deletes what no run needs",
-    ("msgflow fleet ingest", "--views"): (
-        "msgflow fleet sql 'FROM view.publication', or msgflow fleet open RUN and then msgflow"
-        " export parquet"
-    ),
-    ("msgflow ui", "--lake"): "msgflow fleet open RUN --lake LAKE, then msgflow ui --db RUN.duckdb",
-    ("msgflow report", "--lake"): (
-        "msgflow fleet query e2e-latency --group-by run --lake LAKE --format markdown"
-    ),
     ("msgflow graph", "svg"): "msgflow graph | dot -Tsvg; or msgflow ui, page Graph",
 }
 _CANNOT_WRITE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)

@@ -1,4 +1,4 @@
-"""`msgflow events`: the events of a trace, without a database."""
+"""List the events of any CTF traces in order of time."""
 
 from __future__ import annotations
 
@@ -36,9 +36,7 @@ def command(
     reader: Reader = "auto",
     strict: bool = False,
 ) -> None:
-    """List the events of any CTF traces in order of time.
-
-    A line has the time (UTC), host, process name/vpid/vtid, CPU, event name and fields.
+    """A line has the time (UTC), host, process name/vpid/vtid, CPU, event name and fields.
 
     Args:
         traces (TRACE...): Directories with CTF traces, at any depth, or archives of such; all are

@@ -1,4 +1,4 @@
-"""`msgflow export`: the content of a database as files."""
+"""Write the content of a database to files."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""`msgflow fleet`: many recordings in one lake."""
+"""Many recordings, on one machine or many, into one lake of Parquet files."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
 import typer
 
@@ -14,6 +14,7 @@ from msgflow.cli.options import Reader, bytes_of, one_text
 from msgflow.cli.output import Shown, print_list, print_note, print_result, print_status
 from msgflow.cli.sql import DEFAULT_LIMIT, FileOption, sql_of
 from msgflow.errors import ExitCode, UsageError
+from msgflow.export.formats import Format
 from msgflow.result.layout import MOST_ROWS
 from msgflow.run.window import duration_ns
 from msgflow.text.values import count
@@ -156,6 +157,19 @@ def failures(*, lake: str, **shown: Unpack[Shown]) -> None:
     print_result(list_failures(_opened(lake)), **shown)
 
 
+class Selected(TypedDict, total=False):
+    """What is asked of the rows of a query, as options."""
+
+    node: list[str] | None
+    topic: list[str] | None
+    callback: list[str] | None
+    host: list[str] | None
+    via: list[str] | None
+    without: list[str] | None
+    sort: list[str] | None
+    limit: int | None
+
+
 @app.command("query")
 @operation
 def query(
@@ -167,17 +181,12 @@ def query(
     measure: str | None = None,
     section: str | None = None,
     case: str | None = None,
-    node: list[str] | None = None,
-    topic: list[str] | None = None,
-    callback: list[str] | None = None,
-    host: list[str] | None = None,
-    via: list[str] | None = None,
-    without: list[str] | None = None,
-    sort: list[str] | None = None,
-    limit: int | None = None,
     internal: bool = False,
     columns: str | None = None,
-    **shown: Unpack[Shown],
+    form: Format | None = None,
+    output: Path | None = None,
+    wide: bool = False,
+    **selected: Unpack[Selected],
 ) -> None:
     """Ask a named query of many runs, as msgflow query asks it of one.
 
@@ -203,16 +212,13 @@ def query(
     words = {"case": case, "measure": measure, "section": section}
     own = {word: value for word, value in words.items() if value is not None}
     header_of(name, own)
-    selection = {
-        "node": node, "topic": topic, "callback": callback, "host": host, "via": via,
-        "without": without, "sort": sort, "limit": limit,
-    }  # fmt: skip
-    given = {word: one_text(value) for word, value in selection.items()}
+    given = {word: one_text(value) for word, value in selected.items()}
     groups = values_of(one_text(group_by))
     result = fleet_query(
         _opened(lake), name, where=where, group_by=groups, internal=internal, selection=given, **own
     )
-    print_result(result, **shown, columns=columns, most_rows=limit or MOST_ROWS)
+    most = selected.get("limit") or MOST_ROWS
+    print_result(result, form, output, wide=wide, columns=columns, most_rows=most)
 
 
 @app.command("sql")
@@ -333,7 +339,7 @@ def compare(
         case: Flows that count: first or last arrival of each root, newest root of each arrival, or
             all.
         confidence: Confidence level of the intervals.
-        at_least: Smallest change that matters: less is about equal.
+        at_least (CHANGE): Smallest change that matters: less is about equal.
     """
     from msgflow.fleet.compare import compare as compared
 

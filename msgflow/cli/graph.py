@@ -1,4 +1,4 @@
-"""`msgflow graph`: the graph of nodes and topics, for programs that draw it, or as rows."""
+"""Write the graph of nodes, topics, services and actions, with rates and latencies."""
 
 from __future__ import annotations
 

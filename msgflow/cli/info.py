@@ -1,4 +1,4 @@
-"""`msgflow info`: the content of a database, by named queries."""
+"""Print what a database holds: runs, hosts, processes, nodes, topics, counts, data quality."""
 
 from __future__ import annotations
 
@@ -34,9 +34,7 @@ def command(
     output: Path | None = None,
     wide: bool = False,
 ) -> None:
-    """Print what a database holds: runs, hosts, processes, nodes, topics, counts, data quality.
-
-    With --section it takes the options of queries: msgflow info --section nodes --help.
+    """With --section it takes the options of queries: msgflow info --section nodes --help.
 
     Args:
         form (table|json|markdown): By default by the suffix of FILE, else table.

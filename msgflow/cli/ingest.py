@@ -1,4 +1,4 @@
-"""`msgflow ingest`: traces into a database."""
+"""Read LTTng traces of a ROS 2 system into a database, each recording as a run."""
 
 from __future__ import annotations
 
@@ -43,9 +43,7 @@ def command(
     quiet: bool = False,
     database: Path = DEFAULT_DATABASE,
 ) -> None:
-    """Read LTTng traces of a ROS 2 system into a database, each recording as a run.
-
-    Traces of one session, and sessions whose times overlap, are one recording.
+    """Traces of one session, and sessions whose times overlap, are one recording.
 
     Args:
         traces (TRACE...): Directories with CTF traces, at any depth, or archives of such.

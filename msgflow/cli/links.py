@@ -1,4 +1,4 @@
-"""`msgflow links`: indirect links that the application did not declare itself."""
+"""Declare indirect links: how nodes use messages they keep; without a command: list."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`msgflow mcp`: a database for agents."""
+"""Serve the database to an agent, over stdin and stdout (Model Context Protocol)."""
 
 from __future__ import annotations
 
@@ -10,9 +10,7 @@ from msgflow.files.default_files import DEFAULT_DATABASE
 
 @operation
 def command(*, database: Path = DEFAULT_DATABASE) -> None:
-    """Serve the database to an agent, over stdin and stdout (Model Context Protocol).
-
-    It only reads, and reaches no other file. It needs the extra mcp; in a checkout:
+    """It only reads, and reaches no other file. It needs the extra mcp; in a checkout:
     pip install '.[mcp]'. The agent's program starts it, not you.
     """
     from msgflow.cli.signals import restore_default_actions

@@ -1,5 +1,8 @@
 """How a command comes to be: from the signature and the docstring of a function.
 
+Its summary is the first sentence of the docstring; if the function is called `command`, that of its
+module.
+
 A parameter before `*` becomes an argument, one behind it an option; `**part: Unpack[Words]` becomes
 an option for each key of that TypedDict; a `Database` is that of --db, open while the function
 runs. Their help stands in `Args:` of the docstring, with the metavar in brackets: `directory (DIR):
@@ -12,16 +15,15 @@ too.
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
 from copy import copy
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from types import NoneType, UnionType
+from types import NoneType, SimpleNamespace, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
 import docstring_parser
 import typer
-from typer.models import ArgumentInfo, OptionInfo
+from typer.models import OptionInfo
 
 from msgflow.cli.completion import complete
 from msgflow.cli.options import ADVANCED, ADVANCED_NAMES, SHARED, one_text, path_of
@@ -35,20 +37,22 @@ if TYPE_CHECKING:
 Command = Callable[..., None]
 OWN = "own_"
 _PLACES = {"from_", "to", "via", "without"}
-_METAVARS = {bool: "", int: "NUMBER", float: "NUMBER", str: "TEXT"}
-"""What the help shows for a type. A switch takes nothing."""
+_METAVARS = {int: "NUMBER", float: "NUMBER", str: "TEXT"}
+"""What the help shows for a type."""
 
 
 def operation(function: Command) -> Command:
     """Return a command that calls a function, in which Typer finds its parameters and its help."""
-    opened = [name for name, hint in function.__annotations__.items() if hint == "Database"]
+    has_database = function.__annotations__.get("database") == "Database"
 
     def command(*given: Any, **named: Any) -> None:
-        with ExitStack() as stack:
-            databases = {name: stack.enter_context(Database(named[name])) for name in opened}
-            function(*given, **named | databases)
+        if not has_database:
+            function(*given, **named)
+            return
+        with Database(named.pop("database")) as database:
+            function(*given, database=database, **named)
 
-    return _described(command, list(parameters_of(function)), function)
+    return _described(command, list(parameters_of(function)), _help(function))
 
 
 def extends(method: Callable[..., Any]) -> Callable[[Command], Command]:
@@ -62,11 +66,11 @@ def extends(method: Callable[..., Any]) -> Callable[[Command], Command]:
         asked = list(parameters_of(method, skipped=("self", *(each.name for each in own))))
 
         def command(**given: Any) -> None:
-            words = {each.name: given[each.name] for each in own}
-            with Database(given["database"]) as opened:
-                function(**words | {"database": opened}, **_said(given, asked))
+            words = {each.name: given[each.name] for each in own if each.name != "database"}
+            with Database(given["database"]) as database:
+                function(database=database, **words, **_said(given, asked))
 
-        return _described(command, [*asked, *own], function)
+        return _described(command, [*asked, *own], _help(function))
 
     return decorate
 
@@ -91,7 +95,10 @@ def asks(method: Callable[..., Any]) -> Callable[[Command], Command]:
 
         parameters = {each.name: each for each in [*asked, *shown]}
         parameters |= {each.name: each for each in [database, *asked]}
-        return _described(command, list(parameters.values()), method, show)
+        # The summary of a module's only command is the first sentence of the module.
+        more = (_parsed(method).long_description or "").strip()
+        text = more if show.__name__ == "command" else _help(method)
+        return _described(command, list(parameters.values()), text, _help(show))
 
     return decorate
 
@@ -103,11 +110,9 @@ def _said(given: Mapping[str, Any], asked: Iterable[Parameter]) -> dict[str, Any
     return {name: value for name, value in words.items() if value not in (None, [])}
 
 
-def _described(
-    command: Command, parameters: Sequence[Parameter], *functions: Callable[..., Any]
-) -> Command:
+def _described(command: Command, parameters: Sequence[Parameter], *paragraphs: str) -> Command:
     set_parameters(command, parameters)
-    command.__doc__ = "\n\n".join([*map(_help, functions), *_arguments(parameters)])
+    command.__doc__ = "\n\n".join(filter(None, paragraphs))
     return command
 
 
@@ -130,13 +135,18 @@ def parameters_of(
 ) -> Iterator[Parameter]:
     """Yield the parameters of a function, annotated for Typer."""
     documented = {each.arg_name: each for each in _parsed(function).params}
+    names = function.__annotations__.keys() - {"return"}
+    # Types of what is skipped may only be imported where a type checker runs.
+    written = {name: function.__annotations__[name] for name in names if name not in skipped}
+    hints = get_type_hints(
+        SimpleNamespace(__annotations__=written), function.__globals__, include_extras=True
+    )
     for parameter in signature(function).parameters.values():
         if parameter.name in skipped:
             continue
         if parameter.name == "self":
-            parameter = parameter.replace(name="database", annotation="Database")
-        # One by one: not every type of a function is imported where no type checker runs.
-        hint = eval(parameter.annotation, function.__globals__)
+            parameter = parameter.replace(name="database")
+        hint = hints.get(parameter.name, Database)
         if hint is Database:
             option = Parameter(parameter.name, Parameter.KEYWORD_ONLY, default=DEFAULT_DATABASE)
             yield option.replace(annotation=_annotated(option, Path, None))
@@ -154,26 +164,6 @@ def parameters_of(
             yield parameter.replace(default=default, annotation=annotation)
 
 
-def _arguments(parameters: Iterable[Parameter]) -> Iterator[str]:
-    """Yield what arguments are. Typer would show their types as Python writes them."""
-    for parameter in parameters:
-        _, info = get_args(parameter.annotation)
-        if isinstance(info, ArgumentInfo) and info.help:
-            info.hidden = True
-            name = (info.metavar or parameter.name.upper()).strip("[].")
-            yield f"{escape(name)}: {info.help}"
-
-
-def escape(text: str) -> str:
-    """Return a text without markup: Rich prints it as it is."""
-    # Loading that takes longer than all texts, and hardly one has any.
-    if "[" not in text and not text.endswith("\\"):
-        return text
-    from rich import markup
-
-    return markup.escape(text)
-
-
 def _annotated(
     parameter: Parameter, hint: Any, said: docstring_parser.DocstringParam | None
 ) -> Any:
@@ -186,8 +176,10 @@ def _annotated(
         info.show_default = True
     if said is not None:
         text = " ".join((said.description or "").split()).removesuffix(".")
-        info.help = escape(text[:1].upper() + text[1:])
+        info.help = text[:1].upper() + text[1:]
         info.metavar = said.type_name or info.metavar
+        # What others have by default may not hold here.
+        info.show_default = info.show_default is True
     if isinstance(info, OptionInfo) and info.default is ...:
         word = parameter.name.strip("_").removesuffix("_id").replace("_", "-")
         info.default = f"--{word}/--no-{word}" if parameter.default is True else f"--{word}"
@@ -217,8 +209,7 @@ def _plain(hint: Any) -> Any:
 
 
 def _help(function: Callable[..., Any]) -> str:
-    paragraphs = (_parsed(function).description or "").split("\n\n")
-    return escape("\n\n".join(" ".join(each.split()) for each in paragraphs))
+    return (_parsed(function).description or "").strip()
 
 
 def _parsed(function: Callable[..., Any]) -> docstring_parser.Docstring:
@@ -228,7 +219,7 @@ def _parsed(function: Callable[..., Any]) -> docstring_parser.Docstring:
 def header_option(param: Param, panel: str = "Parameters") -> Any:
     """Return the option for a parameter of a header, in which the default stands."""
     flag = f"--{param.name.replace('_', '-')}"
-    metavar = {"BOOLEAN": "", "VARCHAR": "TEXT"}.get(param.type, "NUMBER")
+    metavar = "TEXT" if param.type == "VARCHAR" else "NUMBER"
     completion: Callable[..., list[str]] | None = None
     if param.name in PLACE_PARAMETERS:
         metavar, completion = "NAME", complete("place")
@@ -237,7 +228,7 @@ def header_option(param: Param, panel: str = "Parameters") -> Any:
     return typer.Option(
         f"{flag}/--no-{flag[2:]}" if param.type == "BOOLEAN" else flag,
         metavar=metavar,
-        help=escape(_describe(param)),
+        help=_describe(param),
         show_default=False,
         autocompletion=completion,
         rich_help_panel=ADVANCED if param.name in ADVANCED_NAMES else panel,
@@ -263,9 +254,9 @@ def _describe(param: Param) -> str:
         text += f" ({', '.join(param.choices)})"
     if param.minimum is not None:
         text += f" (at least {param.minimum})"
-    if param.has_default and param.default is not None:
-        default = param.default
-        text += f" [default: {str(default).lower() if isinstance(default, bool) else default}]"
+    # A switch is off unless its help says that it is on.
+    if param.has_default and param.default not in (None, False):
+        text += f" [default: {'on' if param.default is True else param.default}]"
     return text
 
 

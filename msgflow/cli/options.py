@@ -49,20 +49,6 @@ def bytes_of(size: str, example: str, most: float = math.inf) -> int:
     return number
 
 
-def plain(help_option: Any) -> Any:
-    """Return the option --help without a type: it takes nothing."""
-    if help_option is not None:
-        help_option.metavar = ""
-    return help_option
-
-
-def plain_help(command: Any, context: typer.Context) -> None:
-    """Let the help of a command, and of those in it, show no type of --help."""
-    plain(command.get_help_option(context))
-    for each in getattr(command, "commands", {}).values():
-        plain_help(each, context)
-
-
 def one_text(given: Any) -> Any:
     """Return what an option was given: once, it is a text, in which commas may part names."""
     return given[0] if isinstance(given, list) and len(given) == 1 else given

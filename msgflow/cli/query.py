@@ -1,4 +1,4 @@
-"""`msgflow query`: every file of `queries/` is a command with its parameters as options."""
+"""Run a named query; `msgflow query NAME --help` explains it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from msgflow.cli.output import print_list
-from msgflow.cli.query_command import build_command, chosen_by, print_options_of_every_query
+from msgflow.cli.query_command import build_command, chosen_by, options_of_every_query
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import COMMANDS, load_queries, load_query, query_names
 
@@ -25,9 +25,8 @@ class _QueryGroup(TyperGroup):
     def list_commands(self, ctx: Any) -> list[str]:
         return [name for name in query_names() if name not in COMMANDS]
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        super().format_help(ctx, formatter)
-        print_options_of_every_query()
+    def shared_options(self) -> tuple[str, list[Any]]:
+        return "Options of every query", options_of_every_query()
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         header = load_query(cmd_name, _view_names)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Sequence
 from copy import copy
 from inspect import Parameter
 from itertools import pairwise
@@ -11,10 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
-from typer.core import TyperCommand, TyperOption
+from typer.core import TyperCommand
 
-from msgflow.cli.operation import escape, given_of, header_parameter, parameters_of, set_parameters
-from msgflow.cli.options import DefaultGroup, one_text, plain
+from msgflow.cli.help import lay_out_help
+from msgflow.cli.operation import given_of, header_parameter, parameters_of, set_parameters
+from msgflow.cli.options import DefaultGroup, one_text
 from msgflow.cli.output import print_lines, print_result
 from msgflow.database import Database
 from msgflow.errors import UsageError
@@ -153,14 +153,22 @@ def build_command(
     declared = (param for param in header.params if param.name not in _WITHOUT_OPTION)
     set_parameters(command, [*map(header_parameter, declared), *chosen, *printed])
     grain = f"\n\n{header.grain[:1].upper()}{header.grain[1:]}." if header.grain else ""
+    elsewhere = _OF_EVERY_QUERY - ({form.name} if form else set())
     single = typer.Typer(add_completion=False)
     single.command(
         header.words,
-        cls=_command_class(header, {form.name} if form else set()),
-        help=escape(f"{header.title}.\n\n{header.description}{grain}"),
+        help=f"{header.title}.\n\n{header.description}{grain}",
         short_help=header.title,
     )(command)
-    return typer.main.get_command(single)
+    made = typer.main.get_command(single)
+    common = [each for each in made.params if each.name in elsewhere]
+    # The meanings of the columns alone would fill a screen.
+    made.epilog = (
+        f"Columns: {', '.join(column.name for column in header.columns)}; --show explains them\n\n"
+        f"Every query also has {', '.join(each.opts[0] for each in common)}:"
+        " msgflow query --help explains them"
+    )
+    return lay_out_help(made, elsewhere)
 
 
 def _shown_if_useful(parameter: Parameter, header: Header) -> Parameter:
@@ -181,53 +189,7 @@ def _is_useful(name: str, header: Header) -> bool:
     return name != "slowest" or header.slowest is not None
 
 
-def _command_class(header: Header, own: Set[str]) -> type[TyperCommand]:
-    """Return the class of a command; `own` options are not those of every query."""
-
-    class QueryCommand(TyperCommand):
-        def get_help_option(self, ctx: Any) -> Any:
-            return plain(super().get_help_option(ctx))
-
-        def format_help(self, ctx: Any, formatter: Any) -> None:
-            # Completion still offers the options: they are hidden only here.
-            common = [
-                param
-                for param in self.params
-                if isinstance(param, TyperOption) and param.name in _OF_EVERY_QUERY - own
-            ]
-            for param in common:
-                param.hidden = True
-            super().format_help(ctx, formatter)
-            # The meanings of the columns alone would fill a screen.
-            columns = ", ".join(column.name for column in header.columns)
-            names = ", ".join(param.opts[0] for param in common if param.name != "help")
-            for text in (
-                f"Columns: {columns}; --show explains them",
-                f"Every query also has {names}: msgflow query --help explains them",
-            ):
-                filled = textwrap.fill(text, 79, initial_indent=" ", subsequent_indent=" ")
-                typer.echo(f"{filled}\n")
-
-    return QueryCommand
-
-
-def print_options_of_every_query() -> None:
-    """Print the options that every query has, with their help, in a frame."""
-    from rich.console import Console
-    from rich.panel import Panel
-    from rich.table import Table
-    from rich.text import Text
-
-    params = [
-        param
-        for param in build_command(load_query("topics")).params
-        if param.name in _OF_EVERY_QUERY
-    ]
-    names = [", ".join(param.opts) for param in params]
-    grid = Table.grid(padding=(0, 2))
-    grid.add_column(no_wrap=True, min_width=max(map(len, names)))
-    grid.add_column(overflow="fold")
-    for name, param in zip(names, params, strict=True):
-        grid.add_row(Text(name, style="bold cyan"), Text(param.help))
-    panel = Panel(grid, title="Options of every query", title_align="left", border_style="dim")
-    Console().print(panel)
+def options_of_every_query() -> list[Any]:
+    """Return the options that every query has."""
+    command = build_command(load_query("topics"))
+    return [each for each in command.params if each.name in _OF_EVERY_QUERY]

@@ -1,4 +1,4 @@
-"""`msgflow record`: a recording, from the checks before it to the first answer."""
+"""Record a ROS 2 system with LTTng, then print what is wrong and how long messages took."""
 
 from __future__ import annotations
 
@@ -43,10 +43,9 @@ def command(
     ingest: bool = True,
     database: Path = DEFAULT_DATABASE,
 ) -> None:
-    """Record a ROS 2 system with LTTng, then print what is wrong and how long messages took.
+    """Start the nodes after the recording, best as COMMAND: what starts earlier has no names.
 
-    Start the nodes after the recording, best as COMMAND: what starts earlier has no names. Ctrl-C
-    ends the recording, then COMMAND.
+    Ctrl-C ends the recording, then COMMAND.
 
     Args:
         program ([-- COMMAND...]): What to start and record, such as `-- ros2 launch …`; it ends

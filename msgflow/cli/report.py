@@ -1,4 +1,4 @@
-"""`msgflow report`: the pages of a run in one file, or its summary as Markdown."""
+"""Write the pages of a run to one file that any browser opens, without a server."""
 
 from __future__ import annotations
 
@@ -25,9 +25,7 @@ def command(
     max_size: str = "20MB",
     **asked: Any,
 ) -> None:
-    """Write the pages of a run to one file that any browser opens, without a server.
-
-    The first page is a summary. A file that ends with .md gets the summary alone, as Markdown.
+    """The first page is a summary. A file that ends with .md gets the summary alone, as Markdown.
 
     Args:
         output (FILE.html|FILE.md): File to write or replace; - writes the page to stdout.

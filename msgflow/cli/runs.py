@@ -1,4 +1,4 @@
-"""`msgflow runs`: the runs of a database."""
+"""List, rename, label and remove runs; without a command: list."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`msgflow sql`: any query in SQL, read-only; without one, a prompt that completes names."""
+"""Run SQL on the public views, read-only and without access to other files."""
 
 from __future__ import annotations
 
@@ -58,9 +58,7 @@ def command(
     database: Path = DEFAULT_DATABASE,
     **shown: Unpack[Shown],
 ) -> None:
-    """Run SQL on the public views, read-only and without access to other files.
-
-    `msgflow db schema` lists the views. Without a query, a terminal gets a prompt.
+    """`msgflow db schema` lists the views. Without a query, a terminal gets a prompt.
 
     Args:
         text ([SQL]): A query; - reads it from stdin.

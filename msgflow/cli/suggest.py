@@ -1,4 +1,4 @@
-"""`msgflow suggest`: files to review, of what a run shows."""
+"""Write links, paths or requirements that a run shows, as a file to review."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`msgflow ui`: the pages of a database in the browser."""
+"""Show the database in the browser: timeline, paths, graph, executors, comparison."""
 
 from __future__ import annotations
 
@@ -26,9 +26,7 @@ def command(
     memory_limit: str | None = None,
     database: Path = DEFAULT_DATABASE,
 ) -> None:
-    """Show the database in the browser: timeline, paths, graph, executors, comparison.
-
-    The printed address contains a token; without it, nothing is shown. The server answers this
+    """The printed address contains a token; without it, nothing is shown. The server answers this
     machine only: from another one, open the same address through ssh -L. Ctrl-C stops it. While it
     runs, other programs can read the database, and write to it when no page has asked for some
     seconds.

@@ -1,4 +1,4 @@
-"""`msgflow verify`: requirements of a file, checked in a run."""
+"""Check a run against a file of requirements: passed, failed, not measured, no data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`msgflow watch`: a system seen while it runs, window by window."""
+"""See a ROS 2 system while it runs: latency of every path, window by window."""
 
 from __future__ import annotations
 
@@ -73,9 +73,7 @@ def command(
     json: bool = False,
     output: Path | None = None,
 ) -> None:
-    """See a ROS 2 system while it runs: latency of every path, window by window.
-
-    Ctrl-C ends it. `msgflow watch -- ros2 launch …` starts, records and watches a system; Ctrl-C
+    """Ctrl-C ends it. `msgflow watch -- ros2 launch …` starts, records and watches a system; Ctrl-C
     ends that, too. With --targets the exit code is that of `msgflow verify`. It is 1 if COMMAND
     failed.
 
@@ -92,7 +90,7 @@ def command(
         keep_before (TIME): Also keep what came so long before the window of a violation, such as
             5min.
         keep_most: Most violations that are kept, the last ones.
-        prometheus ([ADDRESS:]PORT): Serve metrics for Prometheus, on 127.0.0.1 without an address.
+        prometheus (PORT): Serve metrics for Prometheus on 127.0.0.1; ADDRESS:PORT serves others.
         diagnostics: Publish the verdicts on --targets on /diagnostics, by rclpy.
         ui (PORT): Show the window in the browser, like `msgflow ui`, at this port of 127.0.0.1; 0
             takes any that is free.

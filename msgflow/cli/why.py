@@ -1,4 +1,4 @@
-"""`msgflow why`: why a topic is late, on one screen."""
+"""Explain why a topic is late: who is to blame, where the time goes, what to ask next."""
 
 from __future__ import annotations
 

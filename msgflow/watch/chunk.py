@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import NamedTuple
 
 from msgflow.errors import TraceError
 
@@ -22,8 +23,23 @@ _BETWEEN_SEARCHES = 1.0
 # Rotations in a second, at most.
 _MOST_A_SECOND = 20
 _MOST_OF_TIME = 0.05
-# Number, begin, end and path of a chunk.
-_Found = tuple[int, datetime, datetime, Path]
+
+
+class _Found(NamedTuple):
+    """What the name of a chunk says."""
+
+    number: int
+    begin: datetime
+    end: datetime
+    path: Path
+
+
+class _Last(NamedTuple):
+    """The last chunk of a source; a session that is created anew is another recording."""
+
+    recording: int
+    number: int
+    end: datetime
 
 
 @dataclass(frozen=True, order=True)
@@ -50,8 +66,7 @@ class ChunkFinder:
         self._refused: set[Path] = set()
         # The names that each `archives` had at the last look.
         self._names: dict[Path, set[str]] = {}
-        # Of each source, which recording its last chunk belongs to, its number and its end.
-        self._last: dict[Path, tuple[int, int, datetime]] = {}
+        self._last: dict[Path, _Last] = {}
         # Of each source, what has the form of a chunk and follows none, by number.
         self._odd: dict[Path, dict[int, _Found]] = {}
         self._next_search = 0.0
@@ -93,13 +108,16 @@ class ChunkFinder:
         self._names[archives] = names
         source = archives.parent
         last = self._number(source)
-        numbers = [number for number, *_ in found]
+        numbers = [each.number for each in found]
         # A clock that is set does not mix them up.
         is_by_number = len(set(numbers)) == len(numbers) and all(each > last for each in numbers)
-        found.sort(key=lambda each: each[0] if is_by_number else (each[1], each[0]))
+        if is_by_number:
+            found.sort(key=lambda each: each.number)
+        else:
+            found.sort(key=lambda each: (each.begin, each.number))
         odd = self._odd.setdefault(source, {})
         for each in found:
-            number = each[0]
+            number = each.number
             if number == self._number(source) + 1 and self._may_follow(source, each):
                 yield from self._taken(source, each)
             elif number - 1 in odd:
@@ -109,32 +127,35 @@ class ChunkFinder:
                 odd[number] = each
         if is_last:
             now = datetime.now(UTC)
-            for each in sorted(odd.values(), key=lambda each: each[1]):
-                if each[2] <= now and self._may_follow(source, each):
+            for each in sorted(odd.values(), key=lambda each: each.begin):
+                if each.end <= now and self._may_follow(source, each):
                     yield from self._taken(source, each)
             odd.clear()
 
     def _number(self, source: Path) -> int:
-        return self._last[source][1] if source in self._last else -1
+        return self._last[source].number if source in self._last else -1
 
     def _taken(self, source: Path, found: _Found) -> Iterator[tuple[int, Chunk]]:
-        number, _, end, path = found
-        recording, last, _ = self._last.get(source, (0, -1, end))
-        recording += number <= last
-        self._last[source] = (recording, number, end)
-        if os.access(path, os.R_OK | os.X_OK):
-            yield recording, Chunk(number, source, path)
-        elif os.path.lexists(path):
-            self._fail(PermissionError(0, "permission denied", str(path.parent)))
+        recording = 0
+        if source in self._last:
+            last = self._last[source]
+            # Where numbers begin again, so does the recording.
+            recording = last.recording if found.number > last.number else last.recording + 1
+        self._last[source] = _Last(recording, found.number, found.end)
+        if os.access(found.path, os.R_OK | os.X_OK):
+            yield recording, Chunk(found.number, source, found.path)
+        elif os.path.lexists(found.path):
+            self._fail(PermissionError(0, "permission denied", str(found.path.parent)))
 
     def _may_follow(self, source: Path, found: _Found) -> bool:
         """Tell whether there was time for the chunks that are missing before one."""
         if source not in self._last:
             return True
-        _, last, end = self._last[source]
-        number, begin, *_ = found
-        missing = number - last - 1 if number > last else number
-        passed_s = (begin - end).total_seconds()
+        last = self._last[source]
+        missing = found.number
+        if found.number > last.number:
+            missing -= last.number + 1
+        passed_s = (found.begin - last.end).total_seconds()
         # Names have whole seconds.
         return passed_s >= -1 and missing <= _MOST_A_SECOND * max(passed_s, 1)
 
@@ -162,12 +183,12 @@ def finished_chunks(directory: Path) -> list[Chunk]:
 
 
 def _read(path: Path) -> _Found | None:
-    """Return number, begin, end and path of a chunk; None of what LTTng does not write."""
+    """Return what the name of a chunk says; None of what LTTng does not write."""
     match = _NAME.fullmatch(path.name)
     if match is None or path.is_symlink() or not path.is_dir():
         return None
     try:
-        return int(match["number"]), _time(match["begin"]), _time(match["end"]), path
+        return _Found(int(match["number"]), _time(match["begin"]), _time(match["end"]), path)
     except ValueError:
         return None
 

@@ -180,13 +180,22 @@ def _transition(
         time = publish(thread, middleware, lifecycle.events, time + 4_000, instance)
         time += int(thread.scheduler.random() * 20_000)
         thread.emit(
-            machine.tracepoints.rcl_lifecycle_transition, time, thread.context,
-            lifecycle.handle, lifecycle.state, state,
-        )  # fmt: skip
+            machine.tracepoints.rcl_lifecycle_transition,
+            time,
+            thread.context,
+            lifecycle.handle,
+            lifecycle.state,
+            state,
+        )
         thread.scheduler.truth.lifecycle_transition.add(
-            machine.hostname, thread.process.pid, thread.tid, lifecycle.node,
-            time + machine.epoch, lifecycle.state, state,
-        )  # fmt: skip
+            machine.hostname,
+            thread.process.pid,
+            thread.tid,
+            lifecycle.node,
+            time + machine.epoch,
+            lifecycle.state,
+            state,
+        )
         lifecycle.state = state
     return time + 1_000
     yield  # It takes no step, but is called as one that does.
@@ -205,9 +214,15 @@ def _record(
     values = (number, number / 4, f"frame {number}")
     thread.emit(machine.tracepoints.my_pkg_frame_done, time, thread.context, *values)
     scheduler.truth.user_event.add(
-        number, machine.hostname, thread.process.pid, thread.tid, "my_pkg:frame_done",
-        time + machine.epoch, None if instance is None else instance.callback_instance_id, *values,
-    )  # fmt: skip
+        number,
+        machine.hostname,
+        thread.process.pid,
+        thread.tid,
+        "my_pkg:frame_done",
+        time + machine.epoch,
+        None if instance is None else instance.callback_instance_id,
+        *values,
+    )
     return time + 300
     yield  # It takes no step, but is called as one that does.
 

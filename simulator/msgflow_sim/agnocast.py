@@ -19,8 +19,9 @@ _LATE = 0.1
 _NOTHING = 0
 
 
-def put(thread: Thread, middleware: Middleware, publisher: PublisherObject, message: Message,
-        time: int) -> int:  # fmt: skip
+def put(
+    thread: Thread, middleware: Middleware, publisher: PublisherObject, message: Message, time: int
+) -> int:
     """Publish a message from `time` on; returns when its event is recorded, behind its sending."""
     random = thread.scheduler.random
     end = time + 400 + int(random() * 2_000)
@@ -29,9 +30,13 @@ def put(thread: Thread, middleware: Middleware, publisher: PublisherObject, mess
     message.entry_id = middleware.next_number(publisher.process, publisher.route)
     message.rmw, message.agnocast_ns = end, end + thread.machine.epoch
     thread.emit(
-        thread.machine.tracepoints.agnocast_agnocast_publish, end, thread.context,
-        publisher.handle, publisher.message, message.entry_id,
-    )  # fmt: skip
+        thread.machine.tracepoints.agnocast_agnocast_publish,
+        end,
+        thread.context,
+        publisher.handle,
+        publisher.message,
+        message.entry_id,
+    )
     return end
 
 
@@ -46,25 +51,43 @@ def get(
     if message is None:
         if is_poll:
             thread.emit(
-                machine.tracepoints.agnocast_agnocast_take, reading, thread.context,
-                subscription.handle, _NOTHING, _NOTHING,
-            )  # fmt: skip
+                machine.tracepoints.agnocast_agnocast_take,
+                reading,
+                thread.context,
+                subscription.handle,
+                _NOTHING,
+                _NOTHING,
+            )
         return None, reading
     taken = Taken(
-        next(scheduler.take_ids), message, reading, "agnocast", None,
-        agnocast_ns=reading + machine.epoch, is_replay=message.time < subscription.created,
-    )  # fmt: skip
+        next(scheduler.take_ids),
+        message,
+        reading,
+        "agnocast",
+        None,
+        agnocast_ns=reading + machine.epoch,
+        is_replay=message.time < subscription.created,
+    )
     if is_poll:
         thread.emit(
-            machine.tracepoints.agnocast_agnocast_take, reading, thread.context,
-            subscription.handle, subscription.message, message.entry_id,
-        )  # fmt: skip
+            machine.tracepoints.agnocast_agnocast_take,
+            reading,
+            thread.context,
+            subscription.handle,
+            subscription.message,
+            message.entry_id,
+        )
         return taken, reading
     thread.emit(
-        machine.tracepoints.agnocast_agnocast_create_callable, reading, thread.context,
-        callable_of(thread), subscription.message, message.entry_id, subscription.callback,
+        machine.tracepoints.agnocast_agnocast_create_callable,
+        reading,
+        thread.context,
+        callable_of(thread),
+        subscription.message,
+        message.entry_id,
         subscription.callback,
-    )  # fmt: skip
+        subscription.callback,
+    )
     # Before 2.2 it was queued, which took longer.
     return taken, reading + (6_000 if machine.layout.is_callable_queued else 0)
 
@@ -72,9 +95,12 @@ def get(
 def make_timer_callable(thread: Thread, timer: TimerObject, time: int) -> None:
     """A timer is due."""
     thread.emit(
-        thread.machine.tracepoints.agnocast_agnocast_create_timer_callable, time, thread.context,
-        callable_of(thread), timer.handle,
-    )  # fmt: skip
+        thread.machine.tracepoints.agnocast_agnocast_create_timer_callable,
+        time,
+        thread.context,
+        callable_of(thread),
+        timer.handle,
+    )
 
 
 def callable_of(thread: Thread) -> int:

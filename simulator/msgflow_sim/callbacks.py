@@ -51,9 +51,16 @@ def run_subscription(
     start = time + 400 + int(thread.scheduler.random() * 1_500)
     if code.is_callback:
         return run_callback(
-            thread, middleware, code, start, subscription.callback, subscription.node,
-            "subscription", taken, subscription,
-        )  # fmt: skip
+            thread,
+            middleware,
+            code,
+            start,
+            subscription.callback,
+            subscription.node,
+            "subscription",
+            taken,
+            subscription,
+        )
     taken.write(thread, subscription, None)
     message = taken.message
     cause = CallbackInstance(
@@ -74,19 +81,30 @@ def run_buffer(thread: Thread, middleware: Middleware, buffer: IntraBuffer, time
     if buffer.ring.messages:
         subscription.executor.wake(time)
     taken = Taken(
-        next(thread.scheduler.take_ids), message, time, "ring_buffer", None,
+        next(thread.scheduler.take_ids),
+        message,
+        time,
+        "ring_buffer",
+        None,
         dequeue_ns=time + thread.machine.epoch,
-    )  # fmt: skip
+    )
     taken.is_replay = message.time < subscription.created
     return (
         yield from settle(
             run_callback(
-                thread, middleware, subscription.code, time + 400 + int(random() * 1_500),
-                buffer.callback, subscription.node, "subscription", taken, subscription,
+                thread,
+                middleware,
+                subscription.code,
+                time + 400 + int(random() * 1_500),
+                buffer.callback,
+                subscription.node,
+                "subscription",
+                taken,
+                subscription,
                 is_intra=1,
             )
         )
-    )  # fmt: skip
+    )
 
 
 def run_callback(
@@ -114,14 +132,26 @@ def run_callback(
         root = Root(instance_id, hostname, pid, tid, start, start_ns)
         origins = ((root, ()),) if kind == "timer" else ()
         instance = CallbackInstance(
-            instance_id, start_ns, origins, None, None, tid, start,
+            instance_id,
+            start_ns,
+            origins,
+            None,
+            None,
+            tid,
+            start,
             header_ns=machine.stamp_ns(start),
-        )  # fmt: skip
+        )
     else:
         instance = CallbackInstance(
-            instance_id, start_ns, taken.message.origins, taken.take_id, taken.rmw_ns, tid, start,
+            instance_id,
+            start_ns,
+            taken.message.origins,
+            taken.take_id,
+            taken.rmw_ns,
+            tid,
+            start,
             header_ns=taken.message.header_ns,
-        )  # fmt: skip
+        )
     facts = (instance_id, hostname, pid, tid, node, kind, callback, start_ns)
     _begin(thread, code, start, callback, is_intra)
     outcome = execute(thread, middleware, code, start, instance)

@@ -148,9 +148,19 @@ class Creator:
                 "agnocast_agnocast_publisher_init", handle, node.handle, topic, description.depth
             )
             shared = PublisherObject(
-                self._process, node.description.full_name, topic, handle, handle, 0,
-                memory.on_stack(), True, False, self.time, [], description,
-            )  # fmt: skip
+                self._process,
+                node.description.full_name,
+                topic,
+                handle,
+                handle,
+                0,
+                memory.on_stack(),
+                True,
+                False,
+                self.time,
+                [],
+                description,
+            )
             self.middleware.add_publisher(shared)
             return shared
         address: Callable[[], int] = memory.allocate if is_rclcpp else memory.on_stack
@@ -171,12 +181,21 @@ class Creator:
                 self.emit("rclcpp_construct_ring_buffer", intra.kept.handle, description.depth)
                 self.emit("rclcpp_buffer_to_ipb", intra.kept.handle, memory.allocate())
         publisher = PublisherObject(
-            self._process, node.description.full_name, topic, init_handle, handle, rmw_handle,
+            self._process,
+            node.description.full_name,
+            topic,
+            init_handle,
+            handle,
+            rmw_handle,
             memory.on_stack(),
             is_rclcpp and self._process.is_rclcpp and description.kind not in {"serialized", "rcl"},
-            topic in INTERNAL_TOPICS, self.time, [], description, intra,
+            topic in INTERNAL_TOPICS,
+            self.time,
+            [],
+            description,
+            intra,
             description.kind not in {"typed", "rcl"} and not self._is_every_kind_traced,
-        )  # fmt: skip
+        )
         self.middleware.add_publisher(publisher)
         return publisher
 
@@ -193,10 +212,17 @@ class Creator:
             rmw_handle = 0
             callback = 0 if description.polled else self._next_callback()
             self.emit(
-                "agnocast_agnocast_subscription_init", handle, node.handle, memory.on_stack(),
-                group.handle, f"dummy_take{topic}" if description.polled else symbol, topic,
-                description.depth, callback, callback,
-            )  # fmt: skip
+                "agnocast_agnocast_subscription_init",
+                handle,
+                node.handle,
+                memory.on_stack(),
+                group.handle,
+                f"dummy_take{topic}" if description.polled else symbol,
+                topic,
+                description.depth,
+                callback,
+                callback,
+            )
             begin = self.time
         else:
             self._reader(rmw_handle, f"rt{topic}")
@@ -211,12 +237,21 @@ class Creator:
         )
         created = SubscriptionObject(
             next(self.thread.scheduler.subscription_ids),
-            self._process, executor, group, description,
-            node.description.full_name, handle, rmw_handle, callback, memory.allocate(), code,
+            self._process,
+            executor,
+            group,
+            description,
+            node.description.full_name,
+            handle,
+            rmw_handle,
+            callback,
+            memory.allocate(),
+            code,
             self._process.is_rclcpp and description.kind != "serialized",
             topic in INTERNAL_TOPICS,
-            not publishes and not (code.links and code.links.inputs), begin,
-        )  # fmt: skip
+            not publishes and not (code.links and code.links.inputs),
+            begin,
+        )
         if description.is_agnocast:
             node.objects.polled[topic] = created
             return created
@@ -277,8 +312,9 @@ class Creator:
         memory, name = self._memory, description.name
         handle, callback = memory.allocate(), memory.allocate()
         for event, dds_topic in (
-            ("create_reader", f"rq{name}Request"), ("create_writer", f"rr{name}Reply")
-        ):  # fmt: skip
+            ("create_reader", f"rq{name}Request"),
+            ("create_writer", f"rr{name}Reply"),
+        ):
             kind = _WRITER if event == "create_writer" else _READER
             self._entity(event, memory.allocate(), dds_topic, self._process.gid(kind))
         rmw_handle = memory.allocate()
@@ -288,10 +324,20 @@ class Creator:
         if description.is_action:
             code = replace(code, is_callback=False)
         service = ServiceObject(
-            self._network, self._process, executor, group, node.description.full_name, name,
-            handle, rmw_handle, callback, memory.on_stack(), code, description.is_deferred,
+            self._network,
+            self._process,
+            executor,
+            group,
+            node.description.full_name,
+            name,
+            handle,
+            rmw_handle,
+            callback,
+            memory.on_stack(),
+            code,
+            description.is_deferred,
             description.is_answered_later,
-        )  # fmt: skip
+        )
         node.objects.services[name] = service
         return service
 
@@ -324,10 +370,13 @@ class Creator:
             self._process.goal_threads += 1
             server.threads.append(
                 GoalThread(
-                    self._process, self._process.description.tid(number), server, services[-1],
+                    self._process,
+                    self._process.description.tid(number),
+                    server,
+                    services[-1],
                     self.middleware,
                 )
-            )  # fmt: skip
+            )
         for service in services:
             service.action = server.answer
             self.spin_service(service)
@@ -361,13 +410,25 @@ class Creator:
         group, executor = node.groups[description.group]
         actions = deeds(description.does, node.objects)
         code = UserCode(
-            entity.Work(), tuple(node.publishers[topic] for topic in description.publishes), None,
-            actions, bool(actions),
-        )  # fmt: skip
+            entity.Work(),
+            tuple(node.publishers[topic] for topic in description.publishes),
+            None,
+            actions,
+            bool(actions),
+        )
         client = ClientObject(
-            self._network, self._process, executor, group, node.description.full_name, name,
-            handle, rmw_handle, gid[:16], memory.on_stack(), code,
-        )  # fmt: skip
+            self._network,
+            self._process,
+            executor,
+            group,
+            node.description.full_name,
+            name,
+            handle,
+            rmw_handle,
+            gid[:16],
+            memory.on_stack(),
+            code,
+        )
         node.objects.clients[name] = client
         self._network.add_client(client)
         executor.waitables.append(client)
@@ -383,9 +444,14 @@ class Creator:
         if node.description.is_agnocast:
             callback = handle
             self.emit(
-                "agnocast_agnocast_timer_init", handle, node.handle, self._memory.on_stack(),
-                group.handle, symbol, period // self.thread.machine.layout.timer_unit_ns,
-            )  # fmt: skip
+                "agnocast_agnocast_timer_init",
+                handle,
+                node.handle,
+                self._memory.on_stack(),
+                group.handle,
+                symbol,
+                period // self.thread.machine.layout.timer_unit_ns,
+            )
         else:
             self.emit("rcl_timer_init", handle, period)
         period = int(period / description.rate)
@@ -508,9 +574,21 @@ class Creator:
         place = (thread.machine.hostname, thread.process.pid, thread.tid)
         publication_id = next(thread.scheduler.publication_ids)
         truth.publication.add(
-            publication_id, *place, None, None, None, None, None, None, None, stamp_ns, None, True,
-            None, None,
-        )  # fmt: skip
+            publication_id,
+            *place,
+            None,
+            None,
+            None,
+            None,
+            None,
+            None,
+            None,
+            stamp_ns,
+            None,
+            True,
+            None,
+            None,
+        )
         truth.dds_event.add(publication_id, *place, "dds:write", self.time + thread.machine.epoch)
 
 

@@ -72,10 +72,23 @@ class Discovery:
         publication_id = next(scheduler.publication_ids)
         written.add_to_truth(thread, publication_id)
         scheduler.truth.publication.add(
-            publication_id, machine.hostname, thread.process.pid, thread.tid, None,
-            _TOPIC, None, rmw_handle, None, None, written.rmw + machine.epoch, written.stamp_ns,
-            None, True, None, None,
-        )  # fmt: skip
+            publication_id,
+            machine.hostname,
+            thread.process.pid,
+            thread.tid,
+            None,
+            _TOPIC,
+            None,
+            rmw_handle,
+            None,
+            None,
+            written.rmw + machine.epoch,
+            written.stamp_ns,
+            None,
+            True,
+            None,
+            None,
+        )
         for listener in self._listeners:
             latency = latency_between(thread.process, listener.process)
             arrival = written.end + latency.base + scheduler.tail(latency.tail)

@@ -327,9 +327,14 @@ def _machine(
         length,
     )
     return Machine(
-        identity.hostname, clock, recorder, recording, host.stamp_resolution_ns, host.publish_pace,
+        identity.hostname,
+        clock,
+        recorder,
+        recording,
+        host.stamp_resolution_ns,
+        host.publish_pace,
         None if host.kernel is None else Kernel(host.kernel, host.cpu_count),
-    )  # fmt: skip
+    )
 
 
 def _write_meta(

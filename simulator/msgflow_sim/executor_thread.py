@@ -222,6 +222,10 @@ class ExecutorThread(Thread):
     def _write_state(self, end_ns: int | None) -> None:
         if self._state is not None:
             self.scheduler.truth.executor_state.add(
-                self.machine.hostname, self.process.pid, self.tid, self._state[0], end_ns,
+                self.machine.hostname,
+                self.process.pid,
+                self.tid,
+                self._state[0],
+                end_ns,
                 self._state[1],
-            )  # fmt: skip
+            )

@@ -47,9 +47,13 @@ class ActionServerObject:
     waiting: deque[Goal] = field(default_factory=deque)
 
     def answer(
-        self, thread: Thread, middleware: Middleware, service: ServiceObject, request: Request,
+        self,
+        thread: Thread,
+        middleware: Middleware,
+        service: ServiceObject,
+        request: Request,
         time: int,
-    ) -> int:  # fmt: skip
+    ) -> int:
         """Do what a request of one of its services asks for."""
         goal = request.goal
         assert goal is not None
@@ -85,9 +89,13 @@ class GoalThread(Thread):
     """A thread that executes goals of an action server, one after the other."""
 
     def __init__(
-        self, process: RunningProcess, tid: int, server: ActionServerObject,
-        results: ServiceObject, middleware: Middleware,
-    ) -> None:  # fmt: skip
+        self,
+        process: RunningProcess,
+        tid: int,
+        server: ActionServerObject,
+        results: ServiceObject,
+        middleware: Middleware,
+    ) -> None:
         super().__init__(process, tid)
         process.threads.append(self)
         self.is_busy = False
@@ -168,9 +176,13 @@ class ActionClientObject:
 
 
 def _publish(
-    thread: Thread, middleware: Middleware, publisher: PublisherObject, time: int,
-    instance: CallbackInstance | None, goal: Goal,
-) -> int:  # fmt: skip
+    thread: Thread,
+    middleware: Middleware,
+    publisher: PublisherObject,
+    time: int,
+    instance: CallbackInstance | None,
+    goal: Goal,
+) -> int:
     """Publish feedback or status because of a goal."""
     message = Message(next(thread.scheduler.publication_ids), publisher, thread.tid, instance)
     thread.scheduler.truth.goal_message.add(goal.request.request_id, message.publication_id)

@@ -30,14 +30,21 @@ def publish_intra(
     scheduler, machine = thread.scheduler, thread.machine
     random = scheduler.random
     thread.emit(
-        machine.tracepoints.rclcpp_intra_publish, time, thread.context,
-        publisher.handle, publisher.message,
-    )  # fmt: skip
+        machine.tracepoints.rclcpp_intra_publish,
+        time,
+        thread.context,
+        publisher.handle,
+        publisher.message,
+    )
     publication_id = next(scheduler.publication_ids)
     message = Message(
-        publication_id, publisher, thread.tid, instance,
-        intra=time, intra_ns=time + machine.epoch,
-    )  # fmt: skip
+        publication_id,
+        publisher,
+        thread.tid,
+        instance,
+        intra=time,
+        intra_ns=time + machine.epoch,
+    )
     for buffer in list(intra.targets):
         time = yield thread.hold(time + 250 + int(random() * 900))
         put(thread, middleware, buffer, message, time)

@@ -308,9 +308,14 @@ def _write_truth(
         for run in of_cpu:
             thread = run.thread
             truth.cpu_run.add(
-                hostname, run.cpu, kernel_tid(thread), thread.description.name,
-                thread.priority, run.start + clock, run.end + clock,
-            )  # fmt: skip
+                hostname,
+                run.cpu,
+                kernel_tid(thread),
+                thread.description.name,
+                thread.priority,
+                run.start + clock,
+                run.end + clock,
+            )
     for thread, own in by_thread.items():
         if not thread.description.nodes:
             continue

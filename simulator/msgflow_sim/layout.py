@@ -205,8 +205,10 @@ _KILTED = replace(
 
 # The last one is no tracepoint of ROS 2: applications that use message_filters declare it so.
 _MESSAGE_LINKS = (
-    "message_link_periodic_async", "message_link_partial_sync", "message_link_approximate_sync",
-)  # fmt: skip
+    "message_link_periodic_async",
+    "message_link_partial_sync",
+    "message_link_approximate_sync",
+)
 
 _ROLLING = replace(
     _KILTED,
@@ -278,9 +280,15 @@ def _with_early_cyclone_dds(layout: Layout) -> Layout:
 
 
 _OF_CARET = (
-    "dds_write", "dds_bind_addr_to_stamp", "on_data_available", "sim_time", "construct_executor",
-    "add_callback_group", "callback_group_add_timer", "callback_group_add_subscription",
-)  # fmt: skip
+    "dds_write",
+    "dds_bind_addr_to_stamp",
+    "on_data_available",
+    "sim_time",
+    "construct_executor",
+    "add_callback_group",
+    "callback_group_add_timer",
+    "callback_group_add_subscription",
+)
 _NOT_OF_CARET = re.compile(r"ros2:(rcl_take|rclcpp_take|rmw_publish|rmw_.*_init|.*_executor_.*)")
 
 
@@ -295,9 +303,14 @@ def _with_caret(layout: Layout) -> Layout:
 
 
 _OF_AGNOCAST = (
-    "init", "node_init", "construct_executor", "create_timer_callable", "callable_start",
-    "callable_end", "take",
-)  # fmt: skip
+    "init",
+    "node_init",
+    "construct_executor",
+    "create_timer_callable",
+    "callable_start",
+    "callable_end",
+    "take",
+)
 
 
 def _with_agnocast(layout: Layout) -> Layout:

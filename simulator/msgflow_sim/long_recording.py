@@ -18,31 +18,34 @@ def long_recording() -> Scenario:
     camera = Node(
         "camera",
         publishers=(Publisher("/image", 5, _IMAGE_BYTES), Publisher("/camera_info", 5)),
-        timers=(
-            Timer(200 * MILLISECOND, ("/image", "/camera_info"), Work(900_000, 700_000)),
-        ),
-    )  # fmt: skip
+        timers=(Timer(200 * MILLISECOND, ("/image", "/camera_info"), Work(900_000, 700_000)),),
+    )
     rectifier = Node(
         "rectifier",
         publishers=(Publisher("/image_rect", 5, _IMAGE_BYTES),),
         subscriptions=(
             Subscription(
-                "/image", ("/image_rect",), Work(9_000_000, 4_000_000), 5,
+                "/image",
+                ("/image_rect",),
+                Work(9_000_000, 4_000_000),
+                5,
                 message_type="sensor_msgs::msg::Image",
             ),
             Subscription("/camera_info", depth=5, message_type="sensor_msgs::msg::CameraInfo"),
         ),
-    )  # fmt: skip
+    )
     detector = Node(
         "detector",
         publishers=(Publisher("/detections"),),
         subscriptions=(
             Subscription(
-                "/image_rect", ("/detections",), Work(20_000_000, 15_000_000, 0.02, 120_000_000),
+                "/image_rect",
+                ("/detections",),
+                Work(20_000_000, 15_000_000, 0.02, 120_000_000),
                 message_type="sensor_msgs::msg::Image",
             ),
         ),
-    )  # fmt: skip
+    )
     logger = Node("logger", subscriptions=(Subscription("/detections", logs=True),))
     return Scenario(
         name="long_recording",

@@ -36,9 +36,22 @@ class Message:
     """
 
     __slots__ = (
-        "agnocast_ns", "entry_id", "header_ns", "intra", "intra_ns", "origins", "publication_id",
-        "publisher", "rcl_ns", "rclcpp_ns", "rmw", "rmw_ns", "stamp_ns", "stamps", "tid",
-    )  # fmt: skip
+        "agnocast_ns",
+        "entry_id",
+        "header_ns",
+        "intra",
+        "intra_ns",
+        "origins",
+        "publication_id",
+        "publisher",
+        "rcl_ns",
+        "rclcpp_ns",
+        "rmw",
+        "rmw_ns",
+        "stamp_ns",
+        "stamps",
+        "tid",
+    )
 
     def __init__(
         self,
@@ -237,18 +250,27 @@ class RingBuffer:
             self.read_index = (self.read_index + 1) % self.capacity
         self.messages.append(message)
         thread.emit(
-            thread.machine.tracepoints.rclcpp_ring_buffer_enqueue, time, thread.context,
-            self.handle, self.write_index, size, int(replaced is not None),
-        )  # fmt: skip
+            thread.machine.tracepoints.rclcpp_ring_buffer_enqueue,
+            time,
+            thread.context,
+            self.handle,
+            self.write_index,
+            size,
+            int(replaced is not None),
+        )
         return replaced
 
     def dequeue(self, thread: Thread, time: int) -> Message:
         """Take out the oldest message."""
         message = self.messages.popleft()
         thread.emit(
-            thread.machine.tracepoints.rclcpp_ring_buffer_dequeue, time, thread.context,
-            self.handle, self.read_index, len(self.messages),
-        )  # fmt: skip
+            thread.machine.tracepoints.rclcpp_ring_buffer_dequeue,
+            time,
+            thread.context,
+            self.handle,
+            self.read_index,
+            len(self.messages),
+        )
         self.read_index = (self.read_index + 1) % self.capacity
         return message
 

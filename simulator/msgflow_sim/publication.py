@@ -90,12 +90,23 @@ def write_publication(
     hostname, pid, tid = thread.machine.hostname, thread.process.pid, thread.tid
     truth, topic, is_internal = thread.scheduler.truth, publisher.topic, publisher.is_internal
     truth.publication.add(
-        message.publication_id, hostname, pid, tid, publisher.node, topic,
-        publisher.init_handle, publisher.rmw_handle, message.rclcpp_ns, message.rcl_ns,
-        message.rmw_ns, message.stamp_ns,
-        None if instance is None else instance.callback_instance_id, is_internal,
-        message.intra_ns, message.agnocast_ns,
-    )  # fmt: skip
+        message.publication_id,
+        hostname,
+        pid,
+        tid,
+        publisher.node,
+        topic,
+        publisher.init_handle,
+        publisher.rmw_handle,
+        message.rclcpp_ns,
+        message.rcl_ns,
+        message.rmw_ns,
+        message.stamp_ns,
+        None if instance is None else instance.callback_instance_id,
+        is_internal,
+        message.intra_ns,
+        message.agnocast_ns,
+    )
     if instance is None:
         return
     if instance.request_id is not None:
@@ -104,23 +115,56 @@ def write_publication(
         )
         return
     truth.causal.add(
-        instance.callback_instance_id, message.publication_id, hostname, pid, tid,
+        instance.callback_instance_id,
+        message.publication_id,
+        hostname,
+        pid,
+        tid,
         _kind(instance),
-        instance.start_ns, instance.take_id, instance.take_rmw_ns, topic,
-        message.rcl_ns, message.rmw_ns, is_internal, False,
-    )  # fmt: skip
+        instance.start_ns,
+        instance.take_id,
+        instance.take_rmw_ns,
+        topic,
+        message.rcl_ns,
+        message.rmw_ns,
+        is_internal,
+        False,
+    )
     for polled in instance.polled.values():
         truth.causal.add(
-            None, message.publication_id, hostname, pid, tid, "polled", None, polled.take_id,
-            polled.take_rmw_ns, topic, message.rcl_ns, message.rmw_ns, is_internal, False,
-        )  # fmt: skip
+            None,
+            message.publication_id,
+            hostname,
+            pid,
+            tid,
+            "polled",
+            None,
+            polled.take_id,
+            polled.take_rmw_ns,
+            topic,
+            message.rcl_ns,
+            message.rmw_ns,
+            is_internal,
+            False,
+        )
     for cause in instance.causes:
         used = cause.instance
         truth.causal.add(
-            used.callback_instance_id, message.publication_id, hostname, pid, used.tid,
-            cause.kind, used.start_ns, used.take_id, used.take_rmw_ns, topic,
-            message.rcl_ns, message.rmw_ns, is_internal, cause.is_reuse,
-        )  # fmt: skip
+            used.callback_instance_id,
+            message.publication_id,
+            hostname,
+            pid,
+            used.tid,
+            cause.kind,
+            used.start_ns,
+            used.take_id,
+            used.take_rmw_ns,
+            topic,
+            message.rcl_ns,
+            message.rmw_ns,
+            is_internal,
+            cause.is_reuse,
+        )
 
 
 def _kind(instance: CallbackInstance) -> str:

@@ -145,9 +145,14 @@ class Recorder:
     def write_kernel(self, kernel: Kernel, end: int) -> None:
         """Write the trace of the kernel up to time `end`."""
         write_kernel(
-            kernel, self._directory, self._identity, self._clock, self._truth, end,
+            kernel,
+            self._directory,
+            self._identity,
+            self._clock,
+            self._truth,
+            end,
             self._recording.kernel_tracer,
-        )  # fmt: skip
+        )
 
     # What a stream asks when it is recorded with faults.
 
@@ -192,9 +197,13 @@ class Recorder:
         """Write down a packet without events that the trace shows to be missing."""
         identity = self._identity
         self._truth.missing_packet.add(
-            identity.hostname, self._pids[trace], cpu, since + identity.epoch_ns,
-            end + identity.epoch_ns, cause,
-        )  # fmt: skip
+            identity.hostname,
+            self._pids[trace],
+            cpu,
+            since + identity.epoch_ns,
+            end + identity.epoch_ns,
+            cause,
+        )
 
     def _on_clock(self, emit: Callable[..., None]) -> Callable[..., None]:
         """Return what emits events at the times that the clock of the host shows."""

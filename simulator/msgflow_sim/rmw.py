@@ -43,9 +43,13 @@ class Written:
         machine = thread.machine
         for event, time in self.dds:
             thread.scheduler.truth.dds_event.add(
-                publication_id, machine.hostname, thread.process.pid, thread.tid, event,
+                publication_id,
+                machine.hostname,
+                thread.process.pid,
+                thread.tid,
+                event,
                 time + machine.epoch,
-            )  # fmt: skip
+            )
 
 
 def entity_of(rmw_handle: int) -> int:

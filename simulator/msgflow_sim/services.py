@@ -190,13 +190,21 @@ def call(
     client.sequence_number += 1
     sent = time + 400 + int(random() * 1_500)
     thread.emit(
-        machine.tracepoints.rmw_send_request, sent, thread.context,
-        client.rmw_handle, client.message, client.sequence_number,
-    )  # fmt: skip
+        machine.tracepoints.rmw_send_request,
+        sent,
+        thread.context,
+        client.rmw_handle,
+        client.message,
+        client.sequence_number,
+    )
     request = Request(
-        next(thread.scheduler.request_ids), client, client.sequence_number,
-        None if cause is None else cause.callback_instance_id, thread.tid, sent + machine.epoch,
-    )  # fmt: skip
+        next(thread.scheduler.request_ids),
+        client,
+        client.sequence_number,
+        None if cause is None else cause.callback_instance_id,
+        thread.tid,
+        sent + machine.epoch,
+    )
     if cause is not None and cause.request_id is not None:
         thread.scheduler.truth.link_call.add(
             cause.request_id, cause.is_response, None, request.request_id, None
@@ -214,9 +222,15 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
     assert request is not None
     client = request.client
     thread.emit(
-        tracepoints.rmw_take_request, time, thread.context,
-        service.rmw_handle, service.message, client.gid, request.sequence_number, 1,
-    )  # fmt: skip
+        tracepoints.rmw_take_request,
+        time,
+        thread.context,
+        service.rmw_handle,
+        service.message,
+        client.gid,
+        request.sequence_number,
+        1,
+    )
     request.service, request.taken_tid, request.taken_ns = service, thread.tid, time + epoch
     start = time + 600 + int(random() * 1_500)
     if service.action is not None:
@@ -225,11 +239,17 @@ def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, 
         request.callback_instance_id = next(thread.scheduler.callback_instance_ids)
         end = yield from settle(
             run_callback(
-                thread, middleware, service.code, start, service.callback, service.node, "service",
+                thread,
+                middleware,
+                service.code,
+                start,
+                service.callback,
+                service.node,
+                "service",
                 instance_id=request.callback_instance_id,
                 has_end=not service.is_deferred or machine.layout.has_end_of_deferred,
             )
-        )  # fmt: skip
+        )
     else:
         now = turn(thread, request, time, is_response=False)
         end = yield from settle(execute(thread, middleware, service.code, start, now))
@@ -262,10 +282,15 @@ def respond(thread: Thread, service: ServiceObject, request: Request, time: int)
     request.stamp_ns, request.answered_ns = machine.stamp_ns(stamp), sent + machine.epoch
     request.answered_tid = thread.tid
     thread.emit(
-        machine.tracepoints.rmw_send_response, sent, thread.context,
-        service.rmw_handle, service.message, request.client.gid, request.sequence_number,
+        machine.tracepoints.rmw_send_response,
+        sent,
+        thread.context,
+        service.rmw_handle,
+        service.message,
+        request.client.gid,
+        request.sequence_number,
         request.stamp_ns,
-    )  # fmt: skip
+    )
     service.network.send_response(sent, service, request)
     return sent + 1_500
 
@@ -280,14 +305,26 @@ def run_client(thread: Thread, middleware: Middleware, client: ClientObject, tim
     request = client.responses.popleft()
     if request is None:
         thread.emit(
-            machine.tracepoints.rmw_take_response, time, thread.context,
-            client.rmw_handle, client.message, client.message, 0, 0,
-        )  # fmt: skip
+            machine.tracepoints.rmw_take_response,
+            time,
+            thread.context,
+            client.rmw_handle,
+            client.message,
+            client.message,
+            0,
+            0,
+        )
         return time
     thread.emit(
-        machine.tracepoints.rmw_take_response, time, thread.context,
-        client.rmw_handle, client.message, request.sequence_number, request.stamp_ns, 1,
-    )  # fmt: skip
+        machine.tracepoints.rmw_take_response,
+        time,
+        thread.context,
+        client.rmw_handle,
+        client.message,
+        request.sequence_number,
+        request.stamp_ns,
+        1,
+    )
     request.received_tid, request.received_ns = thread.tid, time + machine.epoch
     client.answered = request.sequence_number
     if client.action is not None:
@@ -299,9 +336,16 @@ def run_client(thread: Thread, middleware: Middleware, client: ClientObject, tim
 def turn(thread: Thread, request: Request, time: int, *, is_response: bool) -> CallbackInstance:
     """What a thread does with what it took, without a callback that is traced."""
     return CallbackInstance(
-        None, None, (), None, None, thread.tid, time,
-        request_id=request.request_id, is_response=is_response,
-    )  # fmt: skip
+        None,
+        None,
+        (),
+        None,
+        None,
+        thread.tid,
+        time,
+        request_id=request.request_id,
+        is_response=is_response,
+    )
 
 
 def write_request(truth: Truth, request: Request) -> None:
@@ -314,20 +358,45 @@ def write_request(truth: Truth, request: Request) -> None:
     host, pid, node, handle = place
     client_host, client_pid = client.process.machine.hostname, client.process.pid
     truth.request.add(
-        request.request_id, client.name, client.gid, request.sequence_number,
-        client_host, client_pid, request.sent_tid, client.node, client.handle, request.sent_ns,
-        request.caller, host, pid, request.taken_tid, node, handle, request.taken_ns,
+        request.request_id,
+        client.name,
+        client.gid,
+        request.sequence_number,
+        client_host,
+        client_pid,
+        request.sent_tid,
+        client.node,
+        client.handle,
+        request.sent_ns,
+        request.caller,
+        host,
+        pid,
+        request.taken_tid,
+        node,
+        handle,
+        request.taken_ns,
         request.callback_instance_id,
-    )  # fmt: skip
+    )
     if request.answered_ns is not None:
         truth.response.add(
-            request.request_id, client.name, client.gid, request.sequence_number,
-            request.stamp_ns, host, pid, request.answered_tid, request.answered_ns,
-            client_host, client_pid, request.received_tid, request.received_ns,
-        )  # fmt: skip
+            request.request_id,
+            client.name,
+            client.gid,
+            request.sequence_number,
+            request.stamp_ns,
+            host,
+            pid,
+            request.answered_tid,
+            request.answered_ns,
+            client_host,
+            client_pid,
+            request.received_tid,
+            request.received_ns,
+        )
     goal = request.goal
     if goal is not None and goal.request is request:
         truth.goal.add(
-            request.request_id, None if request.answered_ns is None else goal.is_accepted,
+            request.request_id,
+            None if request.answered_ns is None else goal.is_accepted,
             None if goal.asking is None else goal.asking.request_id,
-        )  # fmt: skip
+        )

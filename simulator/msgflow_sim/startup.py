@@ -198,9 +198,12 @@ class Startup:
             kind = "reentrant" if group.is_reentrant else "mutually_exclusive"
             if executor.is_agnocast:
                 self._creator.emit(
-                    "agnocast_agnocast_add_callback_group", executor.handle, node.handle,
-                    group.handle, kind,
-                )  # fmt: skip
+                    "agnocast_agnocast_add_callback_group",
+                    executor.handle,
+                    node.handle,
+                    group.handle,
+                    kind,
+                )
             elif executor.handle:
                 self._creator.emit(
                     "ros2_caret_add_callback_group", executor.handle, group.handle, kind

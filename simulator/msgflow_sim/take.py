@@ -49,24 +49,55 @@ class Taken:
         is_internal = subscription.is_internal
         stamp_ns = None if self.method == "ring_buffer" else message.stamp_for(subscription)
         truth.take.add(
-            self.take_id, hostname, pid, tid, subscription.node, publisher.topic,
-            subscription.handle, self.rmw_ns, self.rcl_ns, self.rclcpp_ns, stamp_ns,
-            message.publication_id, instance_id, is_internal, self.method, self.dequeue_ns,
-            subscription.subscription_id, self.agnocast_ns,
-        )  # fmt: skip
+            self.take_id,
+            hostname,
+            pid,
+            tid,
+            subscription.node,
+            publisher.topic,
+            subscription.handle,
+            self.rmw_ns,
+            self.rcl_ns,
+            self.rclcpp_ns,
+            stamp_ns,
+            message.publication_id,
+            instance_id,
+            is_internal,
+            self.method,
+            self.dequeue_ns,
+            subscription.subscription_id,
+            self.agnocast_ns,
+        )
         arrived = subscription.arrivals.pop(message.publication_id, None)
         if arrived is not None:
             truth.arrival.add(self.take_id, arrived + machine.epoch)
         since = message.intra if self.method == "ring_buffer" else message.rmw
         assert since is not None
         truth.transport.add(
-            message.publication_id, self.take_id, publisher.topic,
-            publisher.process.machine.hostname, publisher.process.pid, message.tid,
-            message.rclcpp_ns, message.rcl_ns, message.rmw_ns, stamp_ns,
-            hostname, pid, tid, self.rmw_ns, self.rcl_ns, self.rclcpp_ns, self.time - since,
-            is_internal, self.method, message.intra_ns, self.dequeue_ns, self.is_replay,
+            message.publication_id,
+            self.take_id,
+            publisher.topic,
+            publisher.process.machine.hostname,
+            publisher.process.pid,
+            message.tid,
+            message.rclcpp_ns,
+            message.rcl_ns,
+            message.rmw_ns,
+            stamp_ns,
+            hostname,
+            pid,
+            tid,
+            self.rmw_ns,
+            self.rcl_ns,
+            self.rclcpp_ns,
+            self.time - since,
+            is_internal,
+            self.method,
+            message.intra_ns,
+            self.dequeue_ns,
+            self.is_replay,
             message.is_self_loop(subscription),
-        )  # fmt: skip
+        )
 
     def reach_sink(self, thread: Thread, subscription: SubscriptionObject, end: int | None) -> None:
         """Write down the flows that end here, if they began in timers and are no self loops."""
@@ -75,11 +106,21 @@ class Taken:
             return
         for root, path in self.message.origins:
             thread.scheduler.truth.end_to_end.add(
-                root.callback_instance_id, root.hostname, root.pid, root.tid, root.start_ns,
-                path, machine.hostname, thread.process.pid, thread.tid,
-                subscription.node, self.take_id, self.time + machine.epoch, end + machine.epoch,
+                root.callback_instance_id,
+                root.hostname,
+                root.pid,
+                root.tid,
+                root.start_ns,
+                path,
+                machine.hostname,
+                thread.process.pid,
+                thread.tid,
+                subscription.node,
+                self.take_id,
+                self.time + machine.epoch,
+                end + machine.epoch,
                 end - root.start,
-            )  # fmt: skip
+            )
 
 
 def take(
@@ -101,10 +142,14 @@ def take(
         rcl, rclcpp = _pass_layers(thread, subscription, rmw)
         return None, rclcpp or rcl
     taken = Taken(
-        next(scheduler.take_ids), message, reading, "callback_only", None,
+        next(scheduler.take_ids),
+        message,
+        reading,
+        "callback_only",
+        None,
         is_copy=message.is_copy_for(subscription),
         is_replay=message.time < subscription.created,
-    )  # fmt: skip
+    )
     if subscription.is_silent:
         return taken, reading
     stamp_ns = message.stamp_for(subscription)

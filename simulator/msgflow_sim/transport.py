@@ -225,11 +225,17 @@ class Middleware:
     def _write(self, subscription: SubscriptionObject) -> None:
         machine, ended = subscription.process.machine, subscription.ended
         self._scheduler.truth.subscription.add(
-            subscription.subscription_id, machine.hostname, subscription.process.pid,
-            subscription.node, subscription.description.topic, subscription.handle,
-            subscription.rmw_handle, subscription.created + machine.epoch,
-            None if ended is None else ended + machine.epoch, subscription.is_internal,
-        )  # fmt: skip
+            subscription.subscription_id,
+            machine.hostname,
+            subscription.process.pid,
+            subscription.node,
+            subscription.description.topic,
+            subscription.handle,
+            subscription.rmw_handle,
+            subscription.created + machine.epoch,
+            None if ended is None else ended + machine.epoch,
+            subscription.is_internal,
+        )
 
     def _deliver(self, time: int, message: Message, match: Match) -> None:
         latency = match.latency

@@ -90,10 +90,28 @@ def test_perf_records_the_kernel_if_asked(msgflow: Msgflow) -> None:
 def test_simulate_a_layout_and_a_recording_with_faults(msgflow: Msgflow) -> None:
     arguments = ("--factor", 0.03, "--layout", "humble-fastdds", "--start-late", 0.05)
     result = msgflow(
-        "simulate", "pipeline", "-o", "out", *arguments, "--pause", 0.1, 0.15, "--rotate", 0.2,
-        "--rotate", 0.25, "--lose-events", 0.1, "--lose-packets", 0.1, "--per-process",
-        "--cut", 1, "--slew", 20,
-    )  # fmt: skip
+        "simulate",
+        "pipeline",
+        "-o",
+        "out",
+        *arguments,
+        "--pause",
+        0.1,
+        0.15,
+        "--rotate",
+        0.2,
+        "--rotate",
+        0.25,
+        "--lose-events",
+        0.1,
+        "--lose-packets",
+        0.1,
+        "--per-process",
+        "--cut",
+        1,
+        "--slew",
+        20,
+    )
     assert result.exit_code == 0, result.stderr
     # Three processes in three chunks each.
     assert result.stderr.startswith("9 traces, ")

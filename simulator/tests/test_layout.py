@@ -140,8 +140,11 @@ def test_source_stamps_lie_where_the_release_makes_them(made, read, name):
         if event.name == "ros2:rmw_take" and event.fields["source_timestamp"]
     ]
     assert set(taken) <= stamps
-    written = [e.fields["timestamp"] for e in recording.events
-               if e.name == "dds:write" and "timestamp" in e.fields]  # fmt: skip
+    written = [
+        e.fields["timestamp"]
+        for e in recording.events
+        if e.name == "dds:write" and "timestamp" in e.fields
+    ]
     assert stamps <= set(written) or not written
 
 
@@ -188,8 +191,11 @@ def test_dds_events_belong_to_what_they_belong_to(made, read):
         for e in events
         if e.name.startswith("dds:create_")
     }
-    writers = {e.fields["writer"]: e.fields["topic_name"] for (_, kind), e in created.items()
-               if kind == "dds:create_writer"}  # fmt: skip
+    writers = {
+        e.fields["writer"]: e.fields["topic_name"]
+        for (_, kind), e in created.items()
+        if kind == "dds:create_writer"
+    }
     assert {"rt/topic_a", "rt/rosout", "ros_discovery_info"} < set(writers.values())
     for event in events:
         if event.name == "ros2:rmw_publisher_init":

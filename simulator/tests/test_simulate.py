@@ -123,9 +123,12 @@ def test_an_own_scenario_works(tmp_path):
 def test_a_scenario_without_messages_ends(tmp_path):
     node = Node("idle", timers=(Timer(50_000_000),))
     scenario = Scenario(
-        "idle", "Nothing is sent.", (Host("alpha"),), (Process("idle", "alpha", 100, (node,)),),
+        "idle",
+        "Nothing is sent.",
+        (Host("alpha"),),
+        (Process("idle", "alpha", 100, (node,)),),
         duration_ns=500_000_000,
-    )  # fmt: skip
+    )
     simulation = simulate(scenario, tmp_path / "out")
     callbacks = pq.read_table(simulation.truth["callback_instance"], columns=["kind"]).to_pylist()
     assert 9 <= callbacks.count({"kind": "timer"}) <= 31

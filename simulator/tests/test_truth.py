@@ -237,9 +237,15 @@ def test_every_message_was_taken_once_by_every_subscription_or_is_accounted_for(
     told = Counter(reason for (reason,) in recording.truth("SELECT reason FROM undelivered"))
     assert told == recording.meta["undelivered"]
     assert set(told) <= {
-        "before_discovery", "before_subscription", "expired", "lost_in_transport", "overwritten",
-        "pending_at_end", "subscription_ended", "take_failed",
-    }  # fmt: skip
+        "before_discovery",
+        "before_subscription",
+        "expired",
+        "lost_in_transport",
+        "overwritten",
+        "pending_at_end",
+        "subscription_ended",
+        "take_failed",
+    }
 
 
 def test_queues_of_plain_scenarios_never_overflow(basic):

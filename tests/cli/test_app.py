@@ -7,40 +7,44 @@ import subprocess
 import sys
 from collections.abc import Callable
 from importlib import import_module
-from inspect import getdoc
 from pathlib import Path
 
 import pytest
 from typer.testing import Result
 
 from msgflow.cli.app import COMMANDS
+from msgflow.query.catalogue import load_query
 
 Msgflow = Callable[..., Result]
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_help_of_a_command_begins_with_its_summary(name: str) -> None:
+def test_the_help_of_a_command_begins_with_its_summary(name: str, msgflow: Msgflow) -> None:
     module = import_module(f"msgflow.cli.{name}")
-    if hasattr(module, "command"):
-        assert (getdoc(module.command) or "").startswith(COMMANDS[name])
-    elif not hasattr(module, "app"):
-        assert module.asked([]).help
+    _, summary, *_ = msgflow(name, "--help").stdout.split("\n\n")
+    if hasattr(module, "command") or hasattr(module, "app"):
+        assert " ".join(summary.split()) == (module.__doc__ or "").partition("\n\n")[0]
+        assert f"{name} " in msgflow("--help").stdout
+    else:
+        assert summary == f"{load_query(name).title}."
 
 
 def test_the_help_lists_all_and_imports_none() -> None:
     program = (
         "import sys; sys.argv = ['msgflow', '--help']; from msgflow.cli.app import app\n"
         "try: app()\n"
-        "except SystemExit: print(*(name for name in sys.modules if name.startswith('msgflow.')))"
+        "except SystemExit: print(*sys.modules)"
     )
     run = subprocess.run(
         [sys.executable, "-c", program], check=True, capture_output=True, text=True
     )
     *lines, modules = run.stdout.splitlines()
-    listed = [line.split()[1] for line in lines if line.startswith("│ ")]
+    listed = [line.split()[0] for line in lines if line.startswith("  ")]
     assert [name for name in listed if name in COMMANDS] == list(COMMANDS)
-    imported = {module.removeprefix("msgflow.cli.") for module in modules.split()}
-    assert not imported & set(COMMANDS)
+    imported = set(modules.split())
+    assert not imported & {f"msgflow.cli.{name}" for name in COMMANDS}
+    # They take longer to load than all the rest.
+    assert not imported & {"duckdb", "pyarrow", "rich.console", "rich.markdown"}
 
 
 @pytest.fixture
@@ -61,8 +65,8 @@ def other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.usefixtures("other")
 def test_another_distribution_adds_a_command_and_replaces_none(msgflow: Msgflow) -> None:
-    listed = [line for line in msgflow("--help").stdout.splitlines() if line.startswith("│ ")]
-    assert any(line.split()[1:4] == ["greet", "Greet", "robots."] for line in listed)
+    listed = msgflow("--help").stdout.splitlines()
+    assert any(line.split() == ["greet", "Greet", "robots."] for line in listed)
     assert "other_command" not in sys.modules
     assert msgflow("greet", "r1").stdout == "hello r1\n"
     assert "Usage: msgflow greet" in msgflow("greet", "--help").stdout

@@ -205,9 +205,16 @@ def test_containers_share_a_clock_and_have_equal_pids(msgflow: Msgflow, tmp_path
         path.write_bytes(path.read_bytes().replace(b'"box-2"', b'"box-1"'))
     named = tmp_path / "named.duckdb"
     result = msgflow(
-        "ingest", done.directory, "--db", named, "--quiet",
-        "--host", f"one={done.directory / 'box-1'}", "--host", f"two={done.directory / 'box-2'}",
-    )  # fmt: skip
+        "ingest",
+        done.directory,
+        "--db",
+        named,
+        "--quiet",
+        "--host",
+        f"one={done.directory / 'box-1'}",
+        "--host",
+        f"two={done.directory / 'box-2'}",
+    )
     assert result.exit_code == 0, result.stderr
     with open_db(named) as opened:
         hosts = opened.sql("SELECT hostname FROM host ORDER BY host_id").to_arrow()

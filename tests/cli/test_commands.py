@@ -80,7 +80,7 @@ def test_memory_can_be_limited(
 def test_without_a_command_the_help_is_printed(msgflow: Msgflow) -> None:
     result = msgflow()
     assert result.exit_code == 0
-    positions = [result.stdout.index(f"│ {name} ") for name in ("ingest", "query", "sql", "db")]
+    positions = [result.stdout.index(f"\n  {name} ") for name in ("ingest", "query", "sql", "db")]
     assert positions == sorted(positions)
 
 

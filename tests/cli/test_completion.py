@@ -18,13 +18,30 @@ from thorough import few
 
 from msgflow.db.known_names import known_names
 
-PROGRAM = [sys.executable, "-c", "import sys; sys.argv = ['msgflow']; "
-           "from msgflow.__main__ import main; main()"]  # fmt: skip
+PROGRAM = [
+    sys.executable,
+    "-c",
+    "import sys; sys.argv = ['msgflow']; from msgflow.__main__ import main; main()",
+]
 EVIL = (
-    "/plain", "/two words", "$(touch hacked)", "`touch hacked`", "'; touch hacked; '", '"/quoted"',
-    "/line\nbreak", "\x1b[31m/red", "--help", "~root", "*", "/a\\b", "x;touch hacked", "", "/ünï",
-    "/tab\tbed", "!!",
-)  # fmt: skip
+    "/plain",
+    "/two words",
+    "$(touch hacked)",
+    "`touch hacked`",
+    "'; touch hacked; '",
+    '"/quoted"',
+    "/line\nbreak",
+    "\x1b[31m/red",
+    "--help",
+    "~root",
+    "*",
+    "/a\\b",
+    "x;touch hacked",
+    "",
+    "/ünï",
+    "/tab\tbed",
+    "!!",
+)
 SAFE = {"/plain", "/two words", "/ünï"}
 
 
@@ -299,7 +316,13 @@ def test_completion_imports_no_more_than_it_needs(small_database: Path, tmp_path
     )
     assert done.stdout.split() == ["/chatter"]
     heavy = {
-        "pyarrow", "numpy", "sqlalchemy", "alembic",
-        "msgflow.query.runner", "msgflow.ingest", "msgflow.cli.ingest", "msgflow.db.connection",
-    }  # fmt: skip
+        "pyarrow",
+        "numpy",
+        "sqlalchemy",
+        "alembic",
+        "msgflow.query.runner",
+        "msgflow.ingest",
+        "msgflow.cli.ingest",
+        "msgflow.db.connection",
+    }
     assert heavy & set(done.stderr.split()) == set()

@@ -92,20 +92,13 @@ def test_nothing_is_left_of_a_file_that_failed(
             "msgflow query scheduling --measure preemption or msgflow query waits --by pair",
         ),
         ("query wakeup-latency", "msgflow query scheduling --measure wakeup"),
-        ("query --list", "msgflow query"),
-        ("query critical-path --take 1", "msgflow flow --take ID --why"),
         ("query clocks", "msgflow clocks"),
         ("query clocks-pair", "msgflow clocks --by pair"),
-        ("clocks pairs", "msgflow clocks --by pair"),
         ("query graph --help", "msgflow graph"),
         ("query info", "msgflow info"),
         ("query info --section nodes", "msgflow info --section nodes"),
         ("query info-nodes", "msgflow info --section nodes"),
         ("query links", "msgflow links"),
-        (
-            "export series -o series.csv",
-            "msgflow query flows --times relative -o FILE.csv; for PlotJuggler msgflow export mcap",
-        ),
     ],
 )
 def test_an_old_name_says_the_new_one(msgflow: Msgflow, old: str, new: str) -> None:

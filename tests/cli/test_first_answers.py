@@ -82,8 +82,14 @@ def test_why_keeps_its_columns(ask: Msgflow, name: str, columns: int) -> None:
     if name == "real_overload":
         paths = section(shown, "PATHS")
         assert paths.splitlines()[0].split() == [
-            "path", "roots", "reached", "median", "p95", "max", "reasons",
-        ]  # fmt: skip
+            "path",
+            "roots",
+            "reached",
+            "median",
+            "p95",
+            "max",
+            "reasons",
+        ]
         assert "overwritten 438" in paths
 
 

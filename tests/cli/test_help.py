@@ -37,7 +37,7 @@ def test_it_fits_two_screens(
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(COLUMNS))
     lines = msgflow(*command.split(), "--help").stdout.splitlines()
-    assert f"Usage: msgflow {command.partition(' --')[0]}" in lines[1]
+    assert f"Usage: msgflow {command.partition(' --')[0]}" in lines[0]
     assert len(lines) <= LINES
     assert max(map(cell_len, lines)) <= COLUMNS
     assert not re.findall(r"<[a-z]+[A-Za-z\[\], ]*>", "".join(lines)), "types of Python"
@@ -49,7 +49,7 @@ def test_what_every_query_has_stands_once(
     monkeypatch.setenv("COLUMNS", str(COLUMNS))
     one, every = msgflow("query", "topics", "--help").stdout, msgflow("query", "--help").stdout
     for option in ("--run", "--start", "--format", "--output", "--wide", "--db"):
-        assert f"{option}  " not in one
-        assert f"{option}  " in every
+        assert f"{option} " not in one
+        assert re.search(f"{option}( |\n)", every)
     assert "msgflow query --help explains them" in one
-    assert "│ --topic" in one
+    assert "\n  --topic" in one

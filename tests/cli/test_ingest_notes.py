@@ -17,9 +17,16 @@ Msgflow = Callable[..., Result]
 
 def finding(name: str, count: int, subject: str, **more: object) -> Finding:
     values: dict[str, object] = {
-        "run_id": 1, "trace_id": None, "phase": "recording", "severity": "warning",
-        "detail": "numbers", "cause": "", "cure": "", "title": "", "description": "",
-    }  # fmt: skip
+        "run_id": 1,
+        "trace_id": None,
+        "phase": "recording",
+        "severity": "warning",
+        "detail": "numbers",
+        "cause": "",
+        "cure": "",
+        "title": "",
+        "description": "",
+    }
     return Finding(name=name, count=count, subject=subject, **{**values, **more})  # type: ignore[arg-type]
 
 

@@ -12,6 +12,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from msgflow.cli.help import lay_out_help
 from msgflow.cli.operation import asks, extends, operation
 from msgflow.database import Database
 from msgflow.run.slice import SliceWords, TimeWords
@@ -64,16 +65,19 @@ def test_a_signature_becomes_arguments_and_options() -> None:
 
 def test_a_docstring_becomes_the_help(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "100")
-    text = " ".join(asked(said, "--help").replace("│", " ").split())
+    app = typer.Typer()
+    app.command()(said)
+    command = lay_out_help(typer.main.get_command(app))
+    text = " ".join(command.get_help(typer.Context(command, info_name="say")).split())
     for part in (
-        "Say what was given. All of [it].",
-        "{WHO} [sizes]...",
-        "WHO: The one who says it SIZES: As texts",
+        "Usage: say [OPTIONS] WHO [SIZES] Say what was given. All of [it].",
+        "WHO The one who says it SIZES As texts",
         "--file FILE Where [default: a]",
         "--once Only once",
-        "--really --no-really Is it so [default: really]",
+        "--really, --no-really Is it so [default: --really]",
+        "-m, --most NUMBER How much [default: 1; at most 9]",
         "--from NAME Places",
-        "--run NAME|ID|all Run to read [default: (the latest)]",
+        "--run NAME|ID|all Run to read [default: the latest]",
     ):
         assert part in text
 
@@ -91,7 +95,7 @@ def test_a_command_asks_a_method_of_the_database(monkeypatch: pytest.MonkeyPatch
         return {"path": self.path, "output": output, "run": run, "paths": paths, **times}
 
     @asks(method)
-    def command(found: dict[str, Any], output: Path, *, loud: bool = False) -> None:
+    def written(found: dict[str, Any], output: Path, *, loud: bool = False) -> None:
         """Say it.
 
         Args:
@@ -100,13 +104,16 @@ def test_a_command_asks_a_method_of_the_database(monkeypatch: pytest.MonkeyPatch
         typer.echo((found, output, loud))
 
     found: dict[str, Any] = {
-        "path": Path("x.duckdb"), "output": Path("here"), "run": "all", "paths": Path("paths.yaml"),
-    }  # fmt: skip
-    assert asked(command, "--db=x.duckdb") == str((found, Path("here"), False))
+        "path": Path("x.duckdb"),
+        "output": Path("here"),
+        "run": "all",
+        "paths": Path("paths.yaml"),
+    }
+    assert asked(written, "--db=x.duckdb") == str((found, Path("here"), False))
     given = found | {"output": Path("there"), "run": "1", "end": "3"}
     words = ("--db=x.duckdb", "-o", "there", "--run=1", "--end=3", "--loud")
-    assert asked(command, *words) == str((given, Path("there"), True))
-    assert command.__doc__ == "Write it.\n\nSay it."
+    assert asked(written, *words) == str((given, Path("there"), True))
+    assert written.__doc__ == "Write it.\n\nSay it."
 
 
 def test_a_command_gets_its_database_and_what_a_method_takes() -> None:

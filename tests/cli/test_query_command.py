@@ -92,13 +92,13 @@ def test_a_parameter_without_default_has_to_be_given(
 def test_help_shows_types_choices_defaults_columns_and_brackets(
     msgflow: Msgflow, calls: list[dict[str, Any]]
 ) -> None:
-    words = " ".join(msgflow("query", "example", "--help").stdout.replace("│", " ").split())
+    words = " ".join(msgflow("query", "example", "--help").stdout.split())
     for part in (
         "An example. What [it] means.",
         "--from NAME Where it starts",
         "--max-depth NUMBER How deep [default: 32]",
         "--case WORD Which (first, last) [default: first]",
-        "Whether [default: false]",
+        "Whether",
         "Columns: at_ns; --show explains them",
     ):
         assert part in words

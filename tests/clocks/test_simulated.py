@@ -41,5 +41,6 @@ def test_three_hosts_in_a_chain(tmp_path: Path) -> None:
     # No way between hosts takes less than 220 us.
     assert wrong.columns[0][0].as_py() == 0
     assert [note.partition(" are known")[0] for note in notes] == [
-        "times between alpha and beta", "times between alpha and gamma"
-    ]  # fmt: skip
+        "times between alpha and beta",
+        "times between alpha and gamma",
+    ]

@@ -53,9 +53,12 @@ def test_a_short_command_is_whole(tmp_path: Path) -> None:
     (tmp_path / "hold.py").write_text(HOLD.format(call="flock", kind="EX"))
     command = ["python", "hold.py", path.name]
     with subprocess.Popen(
-        command, executable=sys.executable, cwd=tmp_path,
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-    ) as process:  # fmt: skip
+        command,
+        executable=sys.executable,
+        cwd=tmp_path,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == b"held\n"
         assert lock_holder(path) == f" (process {process.pid}: python hold.py file)"

@@ -26,8 +26,11 @@ def test_identities_without_their_row_are_counted(
                 if relation["child"] == "link_transport.take_id"
             )
             assert found == {
-                "run_id": 1, "child": "link_transport.take_id", "parent": "take", "count": broken
-            }  # fmt: skip
+                "run_id": 1,
+                "child": "link_transport.take_id",
+                "parent": "take",
+                "count": broken,
+            }
         assert broken_relations(connection, 2) == []
 
 

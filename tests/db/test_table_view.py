@@ -17,9 +17,17 @@ VIEWS = table_views()
 AHEAD_NS = 1_000
 # Tables that users see only through the rules that read them.
 INNER = {
-    "definition", "flow_call", "flow_hop", "flow_root", "nearest_message", "orphan_take", "packet",
-    "ring_buffer_event", "stamp_clock", "undelivered",
-}  # fmt: skip
+    "definition",
+    "flow_call",
+    "flow_hop",
+    "flow_root",
+    "nearest_message",
+    "orphan_take",
+    "packet",
+    "ring_buffer_event",
+    "stamp_clock",
+    "undelivered",
+}
 
 
 @pytest.fixture(scope="module")

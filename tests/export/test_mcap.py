@@ -52,24 +52,27 @@ def database(simulated: Callable[..., Path]) -> Iterator[Database]:
     ("begin", "end", "expected"),
     [
         (
-            "path", "latency_ms",
+            "path",
+            "latency_ms",
             "SELECT root_ns, latency_ns FROM end_to_end([1], NULL, NULL, 'callback_start',"
             " 'callback_end', $start, 9223372036854775807) WHERE status = 'reached' AND is_first",
         ),
         thorough(
-            "callback", "duration_ms",
+            "callback",
+            "duration_ms",
             "SELECT start_ns, end_ns - start_ns FROM callback_instance"
             " JOIN callback_label USING (callback_id)"
             " WHERE end_ns IS NOT NULL AND NOT is_internal AND start_ns >= $start",
         ),
         thorough(
-            "topic", "latency_ms",
+            "topic",
+            "latency_ms",
             "SELECT taken_ns, latency_ns FROM link_transport JOIN take USING (take_id)"
             " JOIN subscription USING (subscription_id)"
             " WHERE NOT is_internal AND taken_ns >= $start",
         ),
     ],
-)  # fmt: skip
+)
 def test_every_value_stands_once_in_its_topic(
     database: Database, tmp_path: Path, begin: str, end: str, expected: str
 ) -> None:

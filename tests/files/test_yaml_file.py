@@ -58,9 +58,16 @@ def test_a_name_comes_back(name: str) -> None:
 def test_suggestions_are_read_with_the_names_that_they_hold(name: str) -> None:
     """Also those that stand in comments."""
     row = {
-        "kind": "direct", "node": f"/{name}", "inputs": [f"/in{name}"], "outputs": ["/out"],
-        "is_name_repeated": True, "pid": 1, "host": name, "evidence": name, "doubt": None,
-    }  # fmt: skip
+        "kind": "direct",
+        "node": f"/{name}",
+        "inputs": [f"/in{name}"],
+        "outputs": ["/out"],
+        "is_name_repeated": True,
+        "pid": 1,
+        "host": name,
+        "evidence": name,
+        "doubt": None,
+    }
     doubtful = row | {"doubt": name}
     links = read(LinkSuggestions([], [row, doubtful], [row]).text("msgflow"))
     entry = {"kind": "direct", "node": f"/{name}", "process": 1, "host": name}
@@ -73,9 +80,13 @@ def test_suggestions_are_read_with_the_names_that_they_hold(name: str) -> None:
     given = {
         "service-latency": {"service_name": name, "answered": 99, "round_trip_p99_ns": 10**6},
         "topics-delivery": {
-            "topic_name": name, "subscriber": name, "delivered_percent": 1, "dropped": 1, "lost": 1,
+            "topic_name": name,
+            "subscriber": name,
+            "delivered_percent": 1,
+            "dropped": 1,
+            "lost": 1,
         },
-    }  # fmt: skip
+    }
     results = {query: result(query, given.get(query)) for query in QUERIES}
     run: Any = SimpleNamespace(name=name)
     (target,) = read(suggest_targets(run, results, 0.1))["targets"]

@@ -286,9 +286,14 @@ def test_the_query(built: Analysis, chain: Chain, case: str, sinks: list[tuple[s
     assert row["path"] == "/talker → /a → /relay → /b → /sink"
     counts = {name: row[name] for name in ("roots", *FATES)}
     assert {name: number for name, number in counts.items() if number} == {
-        "roots": 10, "reached": 3, "lost": 2, "no_output": 1, "not_connected": 1,
-        "cut_by_recording": 2, "unknown": 1,
-    }  # fmt: skip
+        "roots": 10,
+        "reached": 3,
+        "lost": 2,
+        "no_output": 1,
+        "not_connected": 1,
+        "cut_by_recording": 2,
+        "unknown": 1,
+    }
     assert row["pairs"] == len(latencies)
     assert (row["min_ns"], row["max_ns"]) == (latencies[0], latencies[-1])
     assert row["median_ns"] == latencies[(len(latencies) - 1) // 2]

@@ -69,8 +69,9 @@ def test_events_that_match_a_pattern_are_loaded(
     ]
     (unknown,) = findings(report, "unknown_event")
     assert unknown[1:] == (
-        1, "events that are not in the catalogue and were not loaded: other:thing (1)"
-    )  # fmt: skip
+        1,
+        "events that are not in the catalogue and were not loaded: other:thing (1)",
+    )
     assert findings(report, "user_event_not_loaded") == []
     with open_db(new_database) as opened:
         assert opened.check() == []
@@ -109,8 +110,11 @@ def test_all_that_msgflow_does_not_read_is_loaded_by_a_star(
     """And what msgflow reads is not read twice."""
     report = ingest([make_trace(FIELDS, EVENTS)], new_database, events=["*"])
     assert [name for name, *_ in rows(new_database, LOADED)] == [
-        "my_pkg:started", "my_pkg:done", "my_pkg:done", "other:thing"
-    ]  # fmt: skip
+        "my_pkg:started",
+        "my_pkg:done",
+        "my_pkg:done",
+        "other:thing",
+    ]
     assert findings(report, "unknown_event") == []
     assert findings(report, "user_event_not_loaded") == []
     assert rows(new_database, "SELECT count(*) FROM callback_instance") == [(1,)]
@@ -192,11 +196,23 @@ HIGH = {f"u{bits}": (1 << bits) - 1 for bits in (8, 16, 32, 64)}
 def test_every_type_of_field_becomes_json(tmp_path: Path, reader: str) -> None:
     """Integers to the last digit; bytes that are no UTF-8 get replacement characters."""
     values: dict[str, Any] = {
-        **LOW, **HIGH, "address": 0xFFFF_FFFF_FFFF_FFFF, "single": 0.5, "double": 1e-310,
-        "text": b'\xff"\\\n\xc3\xa4', "letters": b"abc", "fixed": (-1, 0, 1),
-        "any": (1 << 63, 0), "bytes": (0, 255), "ratios": (0.25, math.nan), "event_id": -7,
-        "ts_ns": 8, "name": b"", "Name": b"N", "payload_0": 3,
-    }  # fmt: skip
+        **LOW,
+        **HIGH,
+        "address": 0xFFFF_FFFF_FFFF_FFFF,
+        "single": 0.5,
+        "double": 1e-310,
+        "text": b'\xff"\\\n\xc3\xa4',
+        "letters": b"abc",
+        "fixed": (-1, 0, 1),
+        "any": (1 << 63, 0),
+        "bytes": (0, 255),
+        "ratios": (0.25, math.nan),
+        "event_id": -7,
+        "ts_ns": 8,
+        "name": b"",
+        "Name": b"N",
+        "payload_0": 3,
+    }
     odd = {**values, "double": math.inf, "single": -math.inf, "any": (), "bytes": ()}
     made = [
         Event(1_000 + number, "my_pkg:all", [given[name] for name in MANY_TYPES])
@@ -211,15 +227,26 @@ def test_every_type_of_field_becomes_json(tmp_path: Path, reader: str) -> None:
     first, second = fields_of(tmp_path / "run.duckdb")
     expected = {
         **{name: values[name] for name in MANY_TYPES},
-        "text": '\N{REPLACEMENT CHARACTER}"\\\nä', "letters": "abc", "fixed": [-1, 0, 1],
-        "any": [1 << 63, 0], "bytes": [0, 255], "ratios": [0.25, None], "name": "", "Name": "N",
-    }  # fmt: skip
+        "text": '\N{REPLACEMENT CHARACTER}"\\\nä',
+        "letters": "abc",
+        "fixed": [-1, 0, 1],
+        "any": [1 << 63, 0],
+        "bytes": [0, 255],
+        "ratios": [0.25, None],
+        "name": "",
+        "Name": "N",
+    }
     lengths = {name for name in first if name.endswith("_length")}
     assert {name: value for name, value in first.items() if name not in lengths} == expected
     assert second | {"text": None, "letters": None} == first | {
-        "double": None, "single": None, "any": [], "bytes": [], "text": None, "letters": None,
+        "double": None,
+        "single": None,
+        "any": [],
+        "bytes": [],
+        "text": None,
+        "letters": None,
         **dict.fromkeys(lengths, 0),
-    }  # fmt: skip
+    }
 
 
 LABELLED = {
@@ -247,11 +274,15 @@ def test_an_enumeration_is_its_label(make_trace: Make, new_database: Path, reade
     ingest([trace], new_database, events=["my_pkg:*"], reader=reader)
     found = fields_of(new_database)
     assert [fields["state"] for fields in found] == [
-        "IDLE", 4, "it's busy", "it's busy", 7, "DONE", "LAST"
-    ]  # fmt: skip
-    assert [fields["side"] for fields in found] == [
-        "LEFT", "LEFT", 0, "RIGHT", "RIGHT", 0, 0
-    ]  # fmt: skip
+        "IDLE",
+        4,
+        "it's busy",
+        "it's busy",
+        7,
+        "DONE",
+        "LAST",
+    ]
+    assert [fields["side"] for fields in found] == ["LEFT", "LEFT", 0, "RIGHT", "RIGHT", 0, 0]
     assert [fields["most"] for fields in found] == ["ALL", 0, 0, 0, 0, 0, 0]
     assert [fields["each"] for fields in found] == [[0, 1]] * len(made)
 
@@ -301,9 +332,12 @@ def test_all_other_tables_stay_as_they_are(tmp_path: Path) -> None:
         path = tmp_path / f"{number}.duckdb"
         ingest([trace], path, events=events)
         with duckdb.connect(str(path), read_only=True) as con:
-            names = [name for (name,) in con.execute(
-                "SELECT table_name FROM duckdb_tables() WHERE schema_name = 'store'"
-            ).fetchall()]  # fmt: skip
+            names = [
+                name
+                for (name,) in con.execute(
+                    "SELECT table_name FROM duckdb_tables() WHERE schema_name = 'store'"
+                ).fetchall()
+            ]
             same = {"run", "user_event", "finding", "process", "thread", "definition"}
             contents.append(
                 {

@@ -387,9 +387,11 @@ def test_independent_counts_where_both_are_declared(answering: Path) -> None:
     both = ANSWERS.replace("]", f", {ANSWERS[8:-1].replace('direct', 'independent')}]")
     with Database(answering) as opened:
         opened.apply_links(write(answering, both))
-        (found,) = opened.query(
-            "info-findings", where="name = 'contradictory_annotations'"
-        ).to_arrow().to_pylist()  # fmt: skip
+        (found,) = (
+            opened.query("info-findings", where="name = 'contradictory_annotations'")
+            .to_arrow()
+            .to_pylist()
+        )
     assert found["detail"].endswith("/in → /out (direct and independent)")
     assert rows(answering, COUNTED) == [("direct", 1, 9)]
 

@@ -63,9 +63,15 @@ def rows(histories: list[History]) -> dict[str, list[dict[str, int | str | None]
     """The histories as rows of the store."""
     tables: dict[str, list[dict[str, int | str | None]]] = {
         name: []
-        for name in ("annotation", "annotation_input", "annotation_output", "callback",
-                     "callback_instance", "publication")
-    }  # fmt: skip
+        for name in (
+            "annotation",
+            "annotation_input",
+            "annotation_output",
+            "callback",
+            "callback_instance",
+            "publication",
+        )
+    }
     timer = HISTORIES * INPUTS + 1
     tables["callback"] = [
         {"callback_id": each, "kind": "subscription", "subscription_id": each}
@@ -85,18 +91,28 @@ def rows(histories: list[History]) -> dict[str, list[dict[str, int | str | None]
         # A run is known by its start, a publication by its moment.
         tables["callback_instance"] += [
             {
-                "callback_instance_id": run.start, "callback_id": run.subscription or timer,
-                "thread_id": run.thread, "start_ns": run.start, "end_ns": run.ended,
-                "start_event_id": run.start, "end_event_id": run.ended,
-                "effective_end_event_id": run.ended, "depth": 1 + len(run.outer),
+                "callback_instance_id": run.start,
+                "callback_id": run.subscription or timer,
+                "thread_id": run.thread,
+                "start_ns": run.start,
+                "end_ns": run.ended,
+                "start_event_id": run.start,
+                "end_event_id": run.ended,
+                "effective_end_event_id": run.ended,
+                "depth": 1 + len(run.outer),
                 "parent_id": run.outer[-1].start if run.outer else None,
             }
             for run in history.runs
-        ]  # fmt: skip
+        ]
         tables["publication"] += [
             {
-                "publication_id": b.at, "publisher_id": b.publisher, "thread_id": b.thread,
-                "start_ns": b.at, "end_ns": b.at, "start_event_id": b.at, "end_event_id": b.at,
+                "publication_id": b.at,
+                "publisher_id": b.publisher,
+                "thread_id": b.thread,
+                "start_ns": b.at,
+                "end_ns": b.at,
+                "start_event_id": b.at,
+                "end_event_id": b.at,
                 "callback_event_id": max(
                     (
                         moment
@@ -108,7 +124,7 @@ def rows(histories: list[History]) -> dict[str, list[dict[str, int | str | None]
                 ),
             }
             for b in history.publications
-        ]  # fmt: skip
+        ]
     return tables
 
 

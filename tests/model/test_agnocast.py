@@ -28,36 +28,60 @@ class Agnocast:
 
     def node(self, thread: Thread, handle: int, name: str) -> None:
         self.system.add(
-            "agnocast:agnocast_node_init", thread, node_handle=handle, node_name=name,
+            "agnocast:agnocast_node_init",
+            thread,
+            node_handle=handle,
+            node_name=name,
             namespace="/",
-        )  # fmt: skip
+        )
 
     def publisher(
         self, thread: Thread, handle: int, topic: str = "/points", node: int = 0x1
     ) -> None:
         self.system.add(
-            "agnocast:agnocast_publisher_init", thread, publisher_handle=handle, node_handle=node,
-            topic_name=topic, queue_depth=1,
-        )  # fmt: skip
+            "agnocast:agnocast_publisher_init",
+            thread,
+            publisher_handle=handle,
+            node_handle=node,
+            topic_name=topic,
+            queue_depth=1,
+        )
 
     def subscription(
-        self, thread: Thread, handle: int, number: int, topic: str = "/points", *, node: int = 0x2,
+        self,
+        thread: Thread,
+        handle: int,
+        number: int,
+        topic: str = "/points",
+        *,
+        node: int = 0x2,
         depth: int = 1,
-    ) -> int:  # fmt: skip
+    ) -> int:
         """One that is polled has number 0; returns what names its callback."""
         callback = thread.pid << 32 | number if number else 0
         self.system.add(
-            "agnocast:agnocast_subscription_init", thread, subscription_handle=handle,
-            node_handle=node, callback_group=0x9, symbol="Filter::cb" if number else "dummy_take",
-            topic_name=topic, queue_depth=depth, pid_callback_info_id=callback,
-        )  # fmt: skip
+            "agnocast:agnocast_subscription_init",
+            thread,
+            subscription_handle=handle,
+            node_handle=node,
+            callback_group=0x9,
+            symbol="Filter::cb" if number else "dummy_take",
+            topic_name=topic,
+            queue_depth=depth,
+            pid_callback_info_id=callback,
+        )
         return callback
 
     def timer(self, thread: Thread, handle: int, period: int, node: int = 0x1) -> None:
         self.system.add(
-            "agnocast:agnocast_timer_init", thread, timer_handle=handle, node_handle=node,
-            callback_group=0x9, symbol="tick", period=period,
-        )  # fmt: skip
+            "agnocast:agnocast_timer_init",
+            thread,
+            timer_handle=handle,
+            node_handle=node,
+            callback_group=0x9,
+            symbol="tick",
+            period=period,
+        )
 
     def publish(self, thread: Thread, handle: int, entry: int) -> int:
         return self.system.add(
@@ -67,9 +91,12 @@ class Agnocast:
     def create(self, thread: Thread, callback: int, entry: int, address: int | None = None) -> int:
         self.callables = address or self.callables + 1
         self.system.add(
-            "agnocast:agnocast_create_callable", thread, callable=self.callables, entry_id=entry,
+            "agnocast:agnocast_create_callable",
+            thread,
+            callable=self.callables,
+            entry_id=entry,
             pid_callback_info_id=callback,
-        )  # fmt: skip
+        )
         return self.callables
 
     def start(self, thread: Thread, address: int) -> None:
@@ -93,9 +120,12 @@ class Agnocast:
 
     def poll(self, thread: Thread, handle: int, entry: int, message: int = 0xB) -> None:
         self.system.add(
-            "agnocast:agnocast_take", thread, subscription_handle=handle, message=message,
+            "agnocast:agnocast_take",
+            thread,
+            subscription_handle=handle,
+            message=message,
             entry_id=entry,
-        )  # fmt: skip
+        )
 
 
 @pytest.fixture
@@ -244,8 +274,10 @@ def test_what_was_passed_over_is_dropped(agnocast: Agnocast, analyse: Analyse) -
         agnocast.publish(SENSOR, 0x10, entry)
     agnocast.run(FILTER, CALLBACK, 3)
     assert analyse(agnocast.system).rows(STATUS) == [
-        (1, "dropped", "overwritten"), (2, "dropped", "overwritten"), (3, "delivered", None),
-    ]  # fmt: skip
+        (1, "dropped", "overwritten"),
+        (2, "dropped", "overwritten"),
+        (3, "delivered", None),
+    ]
 
 
 def test_a_subscription_of_ros_on_the_same_topic_is_not_meant(
@@ -278,8 +310,9 @@ def test_polls(agnocast: Agnocast, analyse: Analyse) -> None:
     model = analyse(agnocast.system)
     assert [row[:3] for row in model.rows(LINKS)] == [(0, "agnocast", 1)] * 2
     assert model.rows("SELECT kind, count(*) FROM link_causal GROUP BY 1 ORDER BY 1") == [
-        ("direct", 2), ("polled", 2),
-    ]  # fmt: skip
+        ("direct", 2),
+        ("polled", 2),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -304,9 +337,12 @@ def test_the_unit_of_a_period(
     agnocast.timer(SENSOR, 0x30, recorded)
     if has_groups:
         agnocast.system.add(
-            "agnocast:agnocast_add_callback_group", SENSOR, executor_addr=0xE,
-            callback_group_addr=0x9, group_type_name="mutually_exclusive",
-        )  # fmt: skip
+            "agnocast:agnocast_add_callback_group",
+            SENSOR,
+            executor_addr=0xE,
+            callback_group_addr=0x9,
+            group_type_name="mutually_exclusive",
+        )
     for _ in range(4 if distance else 1):
         agnocast.tick(SENSOR, 0x30)
         agnocast.system.wait(distance or 0)
@@ -334,20 +370,26 @@ def test_a_bridge_makes_one_flow(agnocast: Agnocast, analyse: Analyse) -> None:
     system.add("ros2:callback_end", far, callback=0x42)
     model = analyse(system)
     assert model.rows("SELECT method FROM link_transport ORDER BY take_id") == [
-        ("agnocast",), ("exact",),
-    ]  # fmt: skip
+        ("agnocast",),
+        ("exact",),
+    ]
     assert model.rows("SELECT kind FROM link_causal") == [("direct",), ("direct",)]
 
 
 def test_executors_and_groups(agnocast: Agnocast, analyse: Analyse) -> None:
     agnocast.system.add(
-        "agnocast:agnocast_construct_executor", FILTER, executor_addr=0xE,
+        "agnocast:agnocast_construct_executor",
+        FILTER,
+        executor_addr=0xE,
         executor_type_name="agnocast_multi_threaded_executor",
-    )  # fmt: skip
+    )
     agnocast.system.add(
-        "agnocast:agnocast_add_callback_group", FILTER, executor_addr=0xE, callback_group_addr=0x9,
+        "agnocast:agnocast_add_callback_group",
+        FILTER,
+        executor_addr=0xE,
+        callback_group_addr=0x9,
         group_type_name="reentrant",
-    )  # fmt: skip
+    )
     agnocast.run(OTHER, CALLBACK, 1)
     model = analyse(agnocast.system)
     assert model.rows(
@@ -377,16 +419,20 @@ def test_caret_reports_what_was_created_before(system: RosSystem, analyse: Analy
     model = analyse(system)
     assert model.rows(LINKS)[0][:3] == (1, "agnocast", 1)
     assert model.rows("SELECT full_name, is_inferred FROM node ORDER BY 1") == [
-        ("/filter", False), ("/sensor", False),
-    ]  # fmt: skip
+        ("/filter", False),
+        ("/sensor", False),
+    ]
     assert model.value("SELECT count(*) FROM publisher") == 1
     assert model.value("SELECT count(*) FROM process") == 2
 
 
 def findings(model: Analysis) -> list[str]:
-    return [name for (name,) in model.connection.execute(
-        "SELECT DISTINCT name FROM main.finding ORDER BY 1"
-    ).fetchall()]  # fmt: skip
+    return [
+        name
+        for (name,) in model.connection.execute(
+            "SELECT DISTINCT name FROM main.finding ORDER BY 1"
+        ).fetchall()
+    ]
 
 
 def test_its_executors_are_not_taken_for_others(agnocast: Agnocast, analyse: Analyse) -> None:

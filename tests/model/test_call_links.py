@@ -363,10 +363,20 @@ def test_flows_and_paths_go_on_from_a_response(system: RosSystem, analyse: Analy
         for (part,) in analysis.rows("SELECT part FROM end_to_end_part([1]) ORDER BY position")
         if part not in {"rclcpp", "rcl", "rmw", "intra", "dds"}
     ] == [
-        "callback", "request_to_take", "take_to_callback", "service", "response_to_take",
-        "callback", "request_to_take", "service", "response_to_take",
-        "callback", "publish_to_take", "take_to_callback", "callback",
-    ]  # fmt: skip
+        "callback",
+        "request_to_take",
+        "take_to_callback",
+        "service",
+        "response_to_take",
+        "callback",
+        "request_to_take",
+        "service",
+        "response_to_take",
+        "callback",
+        "publish_to_take",
+        "take_to_callback",
+        "callback",
+    ]
     assert analysis.rows("SELECT sum(duration_ns) FROM end_to_end_part([1])") == [(ended - begun,)]
 
 
@@ -396,5 +406,7 @@ def test_a_path_through_a_service_that_is_not_traced(system: RosSystem, analyse:
     ]
     parts = analysis.rows("SELECT part, duration_ns FROM end_to_end_part([1]) ORDER BY position")
     assert [part for part, _ in parts if part in {"request_to_take", "service", "callback"}] == [
-        "callback", "service", "callback",
-    ]  # fmt: skip
+        "callback",
+        "service",
+        "callback",
+    ]

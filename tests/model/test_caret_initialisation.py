@@ -17,8 +17,16 @@ def again(system: RosSystem, name: str, at: int, **fields: object) -> None:
 
 def report(system: RosSystem, topic: str = "/a", at: int = 20) -> None:
     """A node with a publisher, reported by kind, not in the order in which they were made."""
-    again(system, "rcl_publisher_init", at, publisher_handle=0x10, node_handle=0x1,
-          rmw_publisher_handle=0x10 + RMW, topic_name=topic, queue_depth=10)  # fmt: skip
+    again(
+        system,
+        "rcl_publisher_init",
+        at,
+        publisher_handle=0x10,
+        node_handle=0x1,
+        rmw_publisher_handle=0x10 + RMW,
+        topic_name=topic,
+        queue_depth=10,
+    )
     again(system, "rcl_node_init", 10, node_handle=0x1, rmw_handle=0, node_name="n", namespace="/")
 
 

@@ -273,8 +273,15 @@ def test_hosts_with_clocks_apart_are_compared_by_messages(pair: Pair, analyse: A
         pair.add("ros2:rclcpp_publish", TALKER, ts=sent, message=0xA)
         pair.publish(TALKER, 0x10, number + 1, layers="rcl rmw")
         if number != 2:
-            pair.add("ros2:rmw_take", listener, ts=sent - second, message=0xB, taken=1,
-                     rmw_subscription_handle=0x1030, source_timestamp=number + 1)  # fmt: skip
+            pair.add(
+                "ros2:rmw_take",
+                listener,
+                ts=sent - second,
+                message=0xB,
+                taken=1,
+                rmw_subscription_handle=0x1030,
+                source_timestamp=number + 1,
+            )
             pair.take(listener, 0x30, 0, layers="rcl rclcpp")
     assert reasons(analyse(pair)) == {1: None, 2: None, 3: "lost_in_transport", 4: None}
 

@@ -426,9 +426,14 @@ def chunks(
     for cpu in (0, 1):
         system.add_packet(0, 200 * MS + cpu, cpu=cpu, trace=0, numbered=numbered)
         system.add_packet(
-            opened + cpu, opened + cpu, count=0, cpu=cpu, trace=1, numbered=numbered,
+            opened + cpu,
+            opened + cpu,
+            count=0,
+            cpu=cpu,
+            trace=1,
+            numbered=numbered,
             lost_packets=lost[cpu],
-        )  # fmt: skip
+        )
         system.add_packet(opened + MS // 2 + cpu, 700 * MS, cpu=cpu, trace=1, numbered=numbered)
 
 

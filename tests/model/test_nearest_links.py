@@ -177,8 +177,15 @@ def test_two_publishers_at_once_are_ambiguous(unstamped: Unstamped, analyse: Ana
         )
         unstamped.system.add("ros2:rmw_publish", thread, ts=at + shift + 2_000, message=0xA)
         unstamped.system.add("ros2:callback_end", thread, ts=at + shift + 40_000, callback=0xC1)
-    unstamped.system.add("ros2:rmw_take", LISTENER, ts=at + 200_000, taken=1, message=0xB,
-                         rmw_subscription_handle=0x1020, source_timestamp=at + 17_000)  # fmt: skip
+    unstamped.system.add(
+        "ros2:rmw_take",
+        LISTENER,
+        ts=at + 200_000,
+        taken=1,
+        message=0xB,
+        rmw_subscription_handle=0x1020,
+        source_timestamp=at + 17_000,
+    )
     model = analyse(unstamped.system)
     assert model.rows(LINKS) == sorted(expected(unstamped.truth), key=lambda row: row[1])
     assert model.rows(

@@ -52,9 +52,17 @@ def test_equal_names_at_one_time_go_with_host_or_process(
     system.context(one)
     system.context(two)
     assert names(system, analyse) == [
-        "/again", "/again", "/lidar@alpha", "/planner@100", "/base@alpha 100", "/camera",
-        "/planner@200", "/base@alpha 200", "/lidar@beta", "/base@beta",
-    ]  # fmt: skip
+        "/again",
+        "/again",
+        "/lidar@alpha",
+        "/planner@100",
+        "/base@alpha 100",
+        "/camera",
+        "/planner@200",
+        "/base@alpha 200",
+        "/lidar@beta",
+        "/base@beta",
+    ]
 
 
 def test_equal_names_in_containers_that_share_host_and_process_id(

@@ -191,13 +191,25 @@ def test_a_priority_tells_the_policy(system: RosSystem, analyse: Analyse) -> Non
     kernel = Kernel(system)
     for ts, prio in ((900, -80), (1100, -101), (1300, 20)):
         kernel.add(
-            "sched_switch", ts, prev_tid=0, prev_prio=20, prev_state=0, next_tid=41,
-            next_prio=prio, next_comm="main",
-        )  # fmt: skip
+            "sched_switch",
+            ts,
+            prev_tid=0,
+            prev_prio=20,
+            prev_state=0,
+            next_tid=41,
+            next_prio=prio,
+            next_comm="main",
+        )
         kernel.add(
-            "sched_switch", ts + 100, prev_tid=41, prev_prio=prio, prev_state=1, next_tid=0,
-            next_prio=20, next_comm="idle",
-        )  # fmt: skip
+            "sched_switch",
+            ts + 100,
+            prev_tid=41,
+            prev_prio=prio,
+            prev_state=1,
+            next_tid=0,
+            next_prio=20,
+            next_comm="idle",
+        )
     call(system, 910, 950, MAIN)
     states = analyse(system).rows(
         "SELECT priority, policy FROM thread_state WHERE state = 'running' ORDER BY start_ns"

@@ -62,9 +62,15 @@ def test_a_sample_is_of_the_innermost_callback_of_its_thread(
     system.events[-1][1]["ts_ns"] = 9_000
     sampled(system, 2_000, 2_500, 3_500, 4_500, 5_500, 6_500, 7_000, 8_000)
     assert analyse(system).rows(OF_CALLBACKS) == [
-        (2_000, 2_000), (2_500, 2_000), (3_500, 3_000), (4_500, 4_000), (5_500, 3_000),
-        (6_500, 2_000), (7_000, None), (8_000, None),
-    ]  # fmt: skip
+        (2_000, 2_000),
+        (2_500, 2_000),
+        (3_500, 3_000),
+        (4_500, 4_000),
+        (5_500, 3_000),
+        (6_500, 2_000),
+        (7_000, None),
+        (8_000, None),
+    ]
 
 
 def test_a_sample_of_another_thread_is_outside(busy: RosSystem, analyse: Analyse) -> None:
@@ -176,13 +182,16 @@ def test_calls_are_from_the_outermost_to_what_ran(busy: RosSystem, analyse: Anal
         "\t  not a line of a stack",
     )
     assert stacks_of(busy, analyse, *lines) == [
-        ([
-            "[unknown] in /opt/lib/libbar.so (deleted)",
-            "py::detail::call:once in /usr/lib/libpybind.so", "Node.tick in /src/a:b.py",
-            "Foo::operator() (int) in /opt/ros/lib (x86)/libfoo.so",
-            "do_syscall_64 in [kernel.kallsyms]",
-        ],)
-    ]  # fmt: skip
+        (
+            [
+                "[unknown] in /opt/lib/libbar.so (deleted)",
+                "py::detail::call:once in /usr/lib/libpybind.so",
+                "Node.tick in /src/a:b.py",
+                "Foo::operator() (int) in /opt/ros/lib (x86)/libfoo.so",
+                "do_syscall_64 in [kernel.kallsyms]",
+            ],
+        )
+    ]
 
 
 def test_what_is_no_code_ends_a_stack(busy: RosSystem, analyse: Analyse) -> None:

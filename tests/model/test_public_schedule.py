@@ -43,8 +43,10 @@ def counted(trace: Path) -> dict[int, list[Run]]:
     """Return when each thread had a CPU, by the text that Babeltrace prints of all switches."""
     text = subprocess.run(
         ["babeltrace2", "--clock-seconds", "--clock-gmt", "--no-delta", str(trace)],
-        capture_output=True, text=True, check=True,
-    ).stdout  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
     runs: dict[int, list[Run]] = defaultdict(list)
     taken: dict[str, tuple[int, int]] = {}
     for found in _SWITCH.finditer(text):

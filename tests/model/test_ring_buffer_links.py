@@ -247,10 +247,13 @@ def test_the_copy_by_the_middleware_is_no_delivery(intra: Intra, analyse: Analys
     ]
     assert model.value("SELECT count(*) FROM stat_delivery WHERE status = 'delivered'") == 2
     assert model.value("SELECT count(*) FROM derive.flow_transport") == 2
-    assert model.value(
-        "SELECT count(*) FROM stat_delivery WHERE status <> 'delivered' AND publication_id IN "
-        "(SELECT publication_id FROM link_transport WHERE is_copy)"
-    ) == 1  # fmt: skip
+    assert (
+        model.value(
+            "SELECT count(*) FROM stat_delivery WHERE status <> 'delivered' AND publication_id IN "
+            "(SELECT publication_id FROM link_transport WHERE is_copy)"
+        )
+        == 1
+    )
 
 
 @pytest.mark.thorough
@@ -261,8 +264,9 @@ def test_a_copy_for_a_reader_that_never_gets_its_turn(
     """Its second callback, for the buffer, shows that it reads one; nothing was taken from it."""
     system = intra.system
     if is_reader:
-        system.add("ros2:rclcpp_subscription_init", LISTENER, subscription_handle=0x20,
-                   subscription=0x3020)  # fmt: skip
+        system.add(
+            "ros2:rclcpp_subscription_init", LISTENER, subscription_handle=0x20, subscription=0x3020
+        )
         system.subscription_callback(LISTENER, 0x3020, 0xCC)
     intra.publish(0)
     system.publish(TALKER, 0x10, 1)
@@ -302,8 +306,9 @@ def test_copies_before_publishers_said_that_they_pass_messages_on(
     system.publisher(talker, 0x10, "/a")
     system.publisher(TALKER, 0x11, "/b")
     system.subscription(LISTENER, 0x20, "/a", callback=0xCB)
-    system.add("ros2:rclcpp_subscription_init", LISTENER, subscription_handle=0x20,
-               subscription=0x3020)  # fmt: skip
+    system.add(
+        "ros2:rclcpp_subscription_init", LISTENER, subscription_handle=0x20, subscription=0x3020
+    )
     system.subscription_callback(LISTENER, 0x3020, 0xCC)
     for number in (1, 2):
         system.publish(talker, 0x10, number)

@@ -54,8 +54,11 @@ def test_any_interval_of_a_thread_divides_as_callbacks_do(
     recorded(system)
     model = analyse(system)
     assert divided(model, 1000, 2000) == {
-        "running": 500, "preempted": 200, "runnable": 100, "sleeping": 200,
-    }  # fmt: skip
+        "running": 500,
+        "preempted": 200,
+        "runnable": 100,
+        "sleeping": 200,
+    }
     assert schedules(model) == [(500, 200, 100, 200, 0, 0)]
     assert divided(model, 0, 950) == {"running": 50, "unknown": 900}
     assert divided(model, 0, 800) == {"unknown": 800}
@@ -311,9 +314,11 @@ def test_it_is_woken_before_its_first_switch(system: RosSystem, analyse: Analyse
     assert analyse(system).rows(
         "SELECT start_ns, end_ns, state FROM thread_state ORDER BY start_ns"
     ) == [
-        (870, 900, "runnable"), (900, 1200, "running"),
-        (2870, 2900, "runnable"), (2900, 3200, "running"),
-    ]  # fmt: skip
+        (870, 900, "runnable"),
+        (900, 1200, "running"),
+        (2870, 2900, "runnable"),
+        (2900, 3200, "running"),
+    ]
 
 
 @pytest.mark.parametrize("other", [Thread(200, cpu=1), Thread(100, cpu=1, trace=3)])

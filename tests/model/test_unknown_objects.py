@@ -101,8 +101,9 @@ def test_the_first_use_of_a_handle_stands_for_its_timer(
     for handle in (0x21, 0x20):
         system.add("ros2:rclcpp_timer_link_node", MAIN, timer_handle=handle, node_handle=0x1)
     assert analyse(system).column("SELECT timer_handle FROM timer ORDER BY timer_id") == [
-        0x20, 0x21,
-    ]  # fmt: skip
+        0x20,
+        0x21,
+    ]
 
 
 def test_timers_of_equal_handles_in_two_processes(system: RosSystem, analyse: Analyse) -> None:
@@ -357,8 +358,14 @@ def test_several_callbacks_behind_a_ring_buffer(system: RosSystem, analyse: Anal
     dequeue(system, 0xB4, None)
     analysis = analyse(system)
     assert analysis.column("SELECT subscription_id FROM take ORDER BY take_id") == [
-        None, None, None, None, 1, 1, 2,
-    ]  # fmt: skip
+        None,
+        None,
+        None,
+        None,
+        1,
+        1,
+        2,
+    ]
     assert uncertain(analysis) == [("ambiguous_buffer", 3), ("unknown_owner", 3)]
 
 

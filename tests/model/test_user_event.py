@@ -67,8 +67,12 @@ def test_of_nested_callbacks_the_innermost_counts(system: RosSystem, analyse: An
     end(system, 0xC1)
     fifth = happen(system)
     assert analyse(system).rows(PLACES) == [
-        (first, outer), (second, inner), (third, middle), (fourth, outer), (fifth, None)
-    ]  # fmt: skip
+        (first, outer),
+        (second, inner),
+        (third, middle),
+        (fourth, outer),
+        (fifth, None),
+    ]
 
 
 def test_the_order_of_events_decides_where_times_are_equal(

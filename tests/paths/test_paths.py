@@ -187,8 +187,11 @@ def test_suggestions_tell_paths_apart_that_begin_and_end_alike(tmp_path: Path) -
     paths = read_paths(file).paths
     assert [path.name.value for path in paths] == ["t-to-d", "t-to-d-2", "nul-to-d"]
     assert paths[0].words() == {
-        "from": ["/t"], "to": ["/d"], "via": ["/b", "/u"], "without": ["/c", "/v"],
-    }  # fmt: skip
+        "from": ["/t"],
+        "to": ["/d"],
+        "via": ["/b", "/u"],
+        "without": ["/c", "/v"],
+    }
     assert read_paths(file).paths[2].words() == {"from": ["/nul"], "to": ["/d"]}
     file.write_text(suggest_paths([]), encoding="utf-8")
     assert read_paths(file).paths == ()

@@ -166,8 +166,12 @@ def test_each_statistic_is_of_the_values_and_in_its_interval(fresh_database: Pat
         rows = {row["statistic"]: row for row in _rows(database, "after", resamples=400)}
     values = {name: row["a_ns"] for name, row in rows.items()}
     assert values == {
-        "median": 500_000, "mean": 500_500, "p95": 950_000, "p99": 990_000, "max": 1_000_000,
-    }  # fmt: skip
+        "median": 500_000,
+        "mean": 500_500,
+        "p95": 950_000,
+        "p99": 990_000,
+        "max": 1_000_000,
+    }
     for name in ("median", "mean", "p95", "p99"):
         row = rows[name]
         assert row["b_ns"] == pytest.approx(10_000_004, abs=6)
@@ -602,25 +606,79 @@ def _fill_runs(path: Path, latencies: list[int]) -> None:
             node_id=2 * run + 1,
             topic_name="/image",
         )
-        add("callback", callback_id=2 * run, run_id=run, node_id=2 * run, kind="timer",
-            timer_id=run, subscription_id=None)  # fmt: skip
-        add("callback", callback_id=2 * run + 1, run_id=run, node_id=2 * run + 1,
-            kind="subscription", timer_id=None, subscription_id=run)  # fmt: skip
+        add(
+            "callback",
+            callback_id=2 * run,
+            run_id=run,
+            node_id=2 * run,
+            kind="timer",
+            timer_id=run,
+            subscription_id=None,
+        )
+        add(
+            "callback",
+            callback_id=2 * run + 1,
+            run_id=run,
+            node_id=2 * run + 1,
+            kind="subscription",
+            timer_id=None,
+            subscription_id=run,
+        )
         for flow in range(20):
             one, start = 100 * run + flow, 10_000_000 * (flow + 1)
-            add("callback_instance", callback_instance_id=2 * one, run_id=run, callback_id=2 * run,
-                start_ns=start, end_ns=start + 20, take_id=None, depth=1)  # fmt: skip
-            add("publication", publication_id=one, run_id=run, publisher_id=run,
-                start_ns=start + 5, end_ns=start + 10)  # fmt: skip
-            add("link_causal", run_id=run, callback_instance_id=2 * one, publication_id=one,
-                publisher_id=run, kind="direct")  # fmt: skip
-            add("take", take_id=one, run_id=run, subscription_id=run, taken_ns=start + 30,
-                method="rmw")  # fmt: skip
-            add("link_transport", run_id=run, publication_id=one, take_id=one, publisher_id=run,
-                subscription_id=run, method="exact")  # fmt: skip
-            add("callback_instance", callback_instance_id=2 * one + 1, run_id=run,
-                callback_id=2 * run + 1, start_ns=start + 40, end_ns=start + latency + flow,
-                take_id=one, depth=1)  # fmt: skip
+            add(
+                "callback_instance",
+                callback_instance_id=2 * one,
+                run_id=run,
+                callback_id=2 * run,
+                start_ns=start,
+                end_ns=start + 20,
+                take_id=None,
+                depth=1,
+            )
+            add(
+                "publication",
+                publication_id=one,
+                run_id=run,
+                publisher_id=run,
+                start_ns=start + 5,
+                end_ns=start + 10,
+            )
+            add(
+                "link_causal",
+                run_id=run,
+                callback_instance_id=2 * one,
+                publication_id=one,
+                publisher_id=run,
+                kind="direct",
+            )
+            add(
+                "take",
+                take_id=one,
+                run_id=run,
+                subscription_id=run,
+                taken_ns=start + 30,
+                method="rmw",
+            )
+            add(
+                "link_transport",
+                run_id=run,
+                publication_id=one,
+                take_id=one,
+                publisher_id=run,
+                subscription_id=run,
+                method="exact",
+            )
+            add(
+                "callback_instance",
+                callback_instance_id=2 * one + 1,
+                run_id=run,
+                callback_id=2 * run + 1,
+                start_ns=start + 40,
+                end_ns=start + latency + flow,
+                take_id=one,
+                depth=1,
+            )
     with duckdb.connect(str(path)) as connection:
         for name, rows in tables.items():
             insert(connection, name, list(rows[0]), [list(row.values()) for row in rows])

@@ -16,14 +16,22 @@ A_TO_B = "/a → /t → /b"
 def compared(subject: str, verdicts: dict[str, str], difference_ns: int | None, **more: Any) -> Any:
     return [
         {
-            "subject": subject, "statistic": statistic, "verdict": verdict, "a_ns": 1_000,
+            "subject": subject,
+            "statistic": statistic,
+            "verdict": verdict,
+            "a_ns": 1_000,
             "b_ns": None if difference_ns is None else 1_000 + difference_ns,
             "change_percent": None if difference_ns is None else difference_ns / 10,
-            "a_share": 1.0, "b_share": 0.5, "a_count": 30, "b_count": 20,
-            "a_ambiguous": 0, "b_ambiguous": 0, **more,
+            "a_share": 1.0,
+            "b_share": 0.5,
+            "a_count": 30,
+            "b_count": 20,
+            "a_ambiguous": 0,
+            "b_ambiguous": 0,
+            **more,
         }
         for statistic, verdict in verdicts.items()
-    ]  # fmt: skip
+    ]
 
 
 ROWS = [

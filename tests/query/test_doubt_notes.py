@@ -15,9 +15,14 @@ from msgflow.db.finding import kinds_of, store_findings
 
 CASE = Path(__file__).parent / "cases" / "e2e-latency" / "marked_links.case"
 QUERIES = (
-    "e2e-latency", "e2e-latency-age", "e2e-latency-reaction", "e2e-latency-response", "flows",
-    "path-breakdown", "critical-path",
-)  # fmt: skip
+    "e2e-latency",
+    "e2e-latency-age",
+    "e2e-latency-reaction",
+    "e2e-latency-response",
+    "flows",
+    "path-breakdown",
+    "critical-path",
+)
 MESSAGE = "/filter: 1 message on /a may be of other publications"
 CAUSE = "/filter: 1 of 3 messages that led to /b may be others"
 

@@ -200,8 +200,12 @@ def with_topics(connection: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnect
     ("run", "given", "first", "last"),
     [
         ("first", {"from": "/camera", "to": "/scan"}, ["/camera"], ["/scan"]),
-        ("first", {"from": "/cam*, /driver", "to": "[main 812]"}, ["/cam*", "/driver"],
-         ["[main 812]"]),
+        (
+            "first",
+            {"from": "/cam*, /driver", "to": "[main 812]"},
+            ["/cam*", "/driver"],
+            ["[main 812]"],
+        ),
         ("first", {"from": None, "to": "/reset"}, None, ["/reset"]),
         ("first", {"from": None}, None, None),
         ("all", {"from": "/lidar", "to": "/scan"}, ["/lidar"], ["/scan"]),
@@ -209,7 +213,7 @@ def with_topics(connection: duckdb.DuckDBPyConnection) -> duckdb.DuckDBPyConnect
         ("first", {"from": "/a,/b", "to": "/b,/a"}, ["/a,/b"], ["/b", "/a"]),
         ("first", {"from": ["/a,/b", "/a"], "to": " /s\u2028 "}, ["/a,/b", "/a"], [" /s\u2028 "]),
     ],
-)  # fmt: skip
+)
 def test_topics_of_the_chosen_runs_will_do(
     with_topics: duckdb.DuckDBPyConnection,
     run: str,
@@ -406,15 +410,17 @@ def test_a_layer_that_was_not_traced_is_the_reason_for_no_rows(
     ("note", "table", "missing"),
     [
         (
-            "kernel", "thread_state",
+            "kernel",
+            "thread_state",
             "the kernel was not traced: msgflow record --kernel, see docs/scheduling.md",
         ),
         (
-            "samples", "stack_sample",
+            "samples",
+            "stack_sample",
             "no functions were sampled: msgflow record --profile 99, see docs/functions.md",
         ),
     ],
-)  # fmt: skip
+)
 def test_an_empty_answer_says_whether_what_it_reads_was_recorded(
     connection: duckdb.DuckDBPyConnection, note: str, table: str, missing: str
 ) -> None:

@@ -264,10 +264,13 @@ def test_words_of_a_selection() -> None:
 
 def latencies(database: Database, **given: Any) -> list[int]:
     return sorted(
-        (row["latency_ns"] for row in rows(database, "flows", case="every_pair", **given)
-         if row["latency_ns"] is not None),
+        (
+            row["latency_ns"]
+            for row in rows(database, "flows", case="every_pair", **given)
+            if row["latency_ns"] is not None
+        ),
         reverse=True,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.thorough

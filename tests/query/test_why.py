@@ -176,7 +176,8 @@ def test_a_warm_up_stays_out_and_is_said(fresh_database: Path, tmp_path: Path) -
     said = "without the first 4.5 s, a warm-up"
     assert [why.start for why in (warm, whole)] == ["4.5s", "0s"]
     assert [why.paths.table["max_ns"][0].as_py() for why in (warm, whole)] == [
-        SECOND // 100, 3 * SECOND // 10,
-    ]  # fmt: skip
+        SECOND // 100,
+        3 * SECOND // 10,
+    ]
     assert [any(said in note for note in why.notes) for why in (warm, whole)] == [True, False]
     assert all("--start" in step for step in warm.steps if step[0] == "query")

@@ -176,8 +176,11 @@ def test_shares_of_known_functions(robot: list[str], tmp_path: Path) -> None:
     program = [*robot[: robot.index("-c")], "-c", NODES, str(tmp_path / "libhogs.so")]
     subprocess.run(
         [*command, "-o", "trace", "--", *program],
-        cwd=tmp_path, check=True, capture_output=True, env=os.environ,
-    )  # fmt: skip
+        cwd=tmp_path,
+        check=True,
+        capture_output=True,
+        env=os.environ,
+    )
     assert sorted(path.name for path in (tmp_path / "trace").iterdir()) == [TEXT, "ust"]
     with Database(tmp_path / "msgflow.duckdb") as database:
         rows = database.query("functions").to_arrow().to_pylist()
@@ -228,15 +231,19 @@ def test_shares_of_known_functions_of_python(robot: list[str], tmp_path: Path) -
     program = [*robot[: robot.index(str(python))], *whole, str(tmp_path / "robot.py")]
     subprocess.run(
         [*command, "--duration", "25", "-o", "trace", "--", *program],
-        cwd=tmp_path, check=True, capture_output=True, env=os.environ,
-    )  # fmt: skip
+        cwd=tmp_path,
+        check=True,
+        capture_output=True,
+        env=os.environ,
+    )
     with Database(tmp_path / "msgflow.duckdb") as database:
         rows = database.query("functions").to_arrow().to_pylist()
         why = database.why()
     found = {(row["callback"], row["function"]): row for row in rows if row["function"] in of_hogs}
     assert found.keys() == {
-        ("Timer(100 ms)", "look"), *(("Subscription(/image)", name) for name in PYTHON_SHARES)
-    }  # fmt: skip
+        ("Timer(100 ms)", "look"),
+        *(("Subscription(/image)", name) for name in PYTHON_SHARES),
+    }
     assert {Path(row["file"]).name for row in found.values()} == {"robot.py"}
     assert sum(found["Subscription(/image)", name]["self_share"] for name in PYTHON_SHARES) > 0.7
     assert any("Subscription(/image): hog_60 " in note for note in why.notes), why.notes

@@ -127,8 +127,9 @@ def test_two_objects_with_one_function_are_told_apart(robot: Robot) -> None:
         executor.spin_once(); executor.spin_once(); executor.spin_once()
     """)
     assert [line for line in robot.traced() if "start" in line] == [
-        "callback_start 7", "callback_start 8",
-    ]  # fmt: skip
+        "callback_start 7",
+        "callback_start 8",
+    ]
 
 
 def test_timers_have_a_node_and_services_no_execution(robot: Robot) -> None:

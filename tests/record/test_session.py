@@ -28,8 +28,11 @@ def test_the_kernel_is_recorded_without_contexts(
     ]
     ((_, domain, *_, first, second, third),) = [w for w in said if w[0] == "add-context"]
     assert (domain, first, second, third) == (
-        "--userspace", "--type=vpid", "--type=vtid", "--type=procname",
-    )  # fmt: skip
+        "--userspace",
+        "--type=vpid",
+        "--type=vtid",
+        "--type=procname",
+    )
     (events,) = (w[-1] for w in said if w[:2] == ("enable-event", "--kernel"))
     assert "sched_switch" in events.split(",")
     assert [words[0] for words in said][-2:] == ["start", "destroy"]

@@ -336,16 +336,34 @@ def test_a_node_hears_verdicts_with_their_culprit(robot: list[str], tmp_path: Pa
     (tmp_path / "targets.yaml").write_text(TARGETS)
     heard = tmp_path / "heard"
     words = [
-        "-m", "msgflow", "watch", "--window", "4s", "--step", "4s", "--targets", "targets.yaml",
-        "--diagnostics", "--json", "--", "timeout", "-s", "INT", "30", *robot, "0.1",
-    ]  # fmt: skip
+        "-m",
+        "msgflow",
+        "watch",
+        "--window",
+        "4s",
+        "--step",
+        "4s",
+        "--targets",
+        "targets.yaml",
+        "--diagnostics",
+        "--json",
+        "--",
+        "timeout",
+        "-s",
+        "INT",
+        "30",
+        *robot,
+        "0.1",
+    ]
     with heard.open("w") as file:
         listener = subprocess.Popen([python, "-c", LISTENER], env=environment, stdout=file)
     try:
         subprocess.run(
-            [python, *words], cwd=tmp_path, capture_output=True,
+            [python, *words],
+            cwd=tmp_path,
+            capture_output=True,
             env=environment | {"PYTHONPATH": os.pathsep.join(sys.path)},
-        )  # fmt: skip
+        )
     finally:
         listener.kill()
         listener.wait()

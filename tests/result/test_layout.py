@@ -55,11 +55,20 @@ def result_of(
 
 def latency(path: str, median_ns: int, **more: Any) -> dict[str, Any]:
     return {
-        "roots": 300, "reached": 298, "cut_by_recording": 2, "pairs": 298, "path": path,
-        "min_ns": median_ns // 2, "median_ns": median_ns, "mean_ns": median_ns + 1_234,
-        "p95_ns": 2 * median_ns, "p99_ns": 3 * median_ns, "max_ns": 4 * median_ns,
-        "sink_event": "callback_end", **more,
-    }  # fmt: skip
+        "roots": 300,
+        "reached": 298,
+        "cut_by_recording": 2,
+        "pairs": 298,
+        "path": path,
+        "min_ns": median_ns // 2,
+        "median_ns": median_ns,
+        "mean_ns": median_ns + 1_234,
+        "p95_ns": 2 * median_ns,
+        "p99_ns": 3 * median_ns,
+        "max_ns": 4 * median_ns,
+        "sink_event": "callback_end",
+        **more,
+    }
 
 
 LATENCIES = [
@@ -69,19 +78,33 @@ LATENCIES = [
 ]
 WAITS = [
     {
-        "start_ns": BEGIN + 1_234_567_891, "node": "/localization/state_estimator",
-        "callback": "Subscription(/localization/odometry)", "since": "publication",
-        "wait_ns": 96_249, "busy_min_ns": 1_000, "busy_max_ns": 90_000, "rest_min_ns": 6_249,
-        "rest_max_ns": 95_249, "callback_instance_id": 4711, "callback_id": 12,
+        "start_ns": BEGIN + 1_234_567_891,
+        "node": "/localization/state_estimator",
+        "callback": "Subscription(/localization/odometry)",
+        "since": "publication",
+        "wait_ns": 96_249,
+        "busy_min_ns": 1_000,
+        "busy_max_ns": 90_000,
+        "rest_min_ns": 6_249,
+        "rest_max_ns": 95_249,
+        "callback_instance_id": 4711,
+        "callback_id": 12,
         "meanwhile": "Subscription(/imu/data) 80.000 µs, Timer(10 ms) of /control/controller"
         " 10.000 µs",
     },
     {
-        "start_ns": BEGIN - 1, "node": "/planning/planner", "callback": "Timer(100 ms)",
-        "wait_ns": None, "busy_min_ns": 0, "busy_max_ns": 0, "rest_min_ns": 0, "rest_max_ns": 0,
-        "callback_instance_id": 4712, "callback_id": 13,
+        "start_ns": BEGIN - 1,
+        "node": "/planning/planner",
+        "callback": "Timer(100 ms)",
+        "wait_ns": None,
+        "busy_min_ns": 0,
+        "busy_max_ns": 0,
+        "rest_min_ns": 0,
+        "rest_max_ns": 0,
+        "callback_instance_id": 4712,
+        "callback_id": 13,
     },
-]  # fmt: skip
+]
 HOSTILE = [
     {
         "topic_name": "/\x1b[31mred\n/x",
@@ -202,12 +225,19 @@ def test_a_zero_that_is_the_answer_is_shown(width: int) -> None:
         "topics-delivery",
         [
             {
-                "topic_name": "/perception/camera/image", "subscriber": "/perception/detector",
-                "published": 299, "delivered": 298, "not_connected": 1, "delivered_percent": 100.0,
-                "lost_percent": 0.0, "reasons": [("pending_at_end", 1)], "subscription_id": 4,
+                "topic_name": "/perception/camera/image",
+                "subscriber": "/perception/detector",
+                "published": 299,
+                "delivered": 298,
+                "not_connected": 1,
+                "delivered_percent": 100.0,
+                "lost_percent": 0.0,
+                "reasons": [("pending_at_end", 1)],
+                "subscription_id": 4,
             },
-        ] * 2,
-    )  # fmt: skip
+        ]
+        * 2,
+    )
     titles = {column.title for column in lay_out(delivery, width).columns}
     assert {"delivered", "dropped", "lost"} <= titles
     assert width < 100 or "unknown" in titles
@@ -217,12 +247,18 @@ def test_a_zero_that_is_the_answer_is_shown(width: int) -> None:
 def pieces(rank: int, latency_ns: int, path: str) -> list[dict[str, Any]]:
     return [
         {
-            "rank": rank, "at_ns": at_ns, "duration_ns": 7, "node": "/n", "share": 0.5,
-            "activity": "callback", "take_id": 10 * rank, "latency_ns": latency_ns,
+            "rank": rank,
+            "at_ns": at_ns,
+            "duration_ns": 7,
+            "node": "/n",
+            "share": 0.5,
+            "activity": "callback",
+            "take_id": 10 * rank,
+            "latency_ns": latency_ns,
             "path": None if at_ns else path,
         }
         for at_ns in (0, 7)
-    ]  # fmt: skip
+    ]
 
 
 def test_what_holds_of_several_rows_stands_above_them_once() -> None:
@@ -264,13 +300,19 @@ def callbacks(*nodes: str) -> QueryResult:
         "callbacks",
         [
             {
-                "node": node, "callback": f"Subscription({node}/topic)", "count": 299,
-                "median_ns": 800_000, "p95_ns": 900_000 + place, "max_ns": 950_000,
-                "min_ns": 700_000, "p99_ns": 940_000, "mean_ns": 800_001,
+                "node": node,
+                "callback": f"Subscription({node}/topic)",
+                "count": 299,
+                "median_ns": 800_000,
+                "p95_ns": 900_000 + place,
+                "max_ns": 950_000,
+                "min_ns": 700_000,
+                "p99_ns": 940_000,
+                "mean_ns": 800_001,
             }
             for place, node in enumerate(nodes)
         ],
-    )  # fmt: skip
+    )
 
 
 def titles_of(result: QueryResult, width: int) -> list[str]:
@@ -298,11 +340,16 @@ def test_widths_are_those_with_which_rows_take_few_lines() -> None:
 def test_short_text_is_not_broken_for_a_less_important_column() -> None:
     rows = [
         {
-            "node": "/a", "callback": "Timer(10 ms)", "wait_ns": n + 10**6, "start_ns": BEGIN + n,
-            "busy_min_ns": n, "busy_max_ns": n, "since": f"of the last timer {n}",
+            "node": "/a",
+            "callback": "Timer(10 ms)",
+            "wait_ns": n + 10**6,
+            "start_ns": BEGIN + n,
+            "busy_min_ns": n,
+            "busy_max_ns": n,
+            "since": f"of the last timer {n}",
         }
         for n in range(2)
-    ]  # fmt: skip
+    ]
     waits = result_of("waits-instance", rows)
     least = next(width for width in range(60, 99) if "since" in titles_of(waits, width))
     assert "of the last timer 0" in lines_of(waits, least)[2]

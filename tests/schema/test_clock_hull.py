@@ -21,12 +21,14 @@ def add(
         "INSERT INTO bound VALUES (2, 1, ?, ?, ?, ?)",
         [
             (
-                is_packet, sense, BEGIN_NS + round(moment * 1e9),
+                is_packet,
+                sense,
+                BEGIN_NS + round(moment * 1e9),
                 round((bound - sense * BEHIND) * 1e3),
             )
             for moment, bound in points
         ],
-    )  # fmt: skip
+    )
 
 
 def corners(con: duckdb.DuckDBPyConnection, sense: int = -1) -> list[Point]:

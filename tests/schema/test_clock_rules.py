@@ -14,8 +14,10 @@ def agreed(
     con: duckdb.DuckDBPyConnection, intervals: Sequence[tuple[int, int, int]]
 ) -> list[tuple[int, int]]:
     """(difference, votes) for intervals of (least, greatest, so many messages)."""
-    con.execute("CREATE OR REPLACE TABLE interval_ (clock_id BIGINT, stretch BIGINT, "
-                "least_ns BIGINT, greatest_ns BIGINT)")  # fmt: skip
+    con.execute(
+        "CREATE OR REPLACE TABLE interval_ (clock_id BIGINT, stretch BIGINT, "
+        "least_ns BIGINT, greatest_ns BIGINT)"
+    )
     for least, greatest, count in intervals:
         con.execute(
             "INSERT INTO interval_ SELECT 1, 0, ?, ? FROM range(?)", [least, greatest, count]
@@ -35,17 +37,27 @@ def followed(
     is_here: bool = True,
 ) -> list[tuple[int, int, int]]:
     """(difference, votes, segment) per stretch, of regions (difference, half width, votes)."""
-    con.execute("CREATE OR REPLACE TABLE region (clock_id BIGINT, stretch BIGINT, least_ns BIGINT, "
-                "greatest_ns BIGINT, difference_ns BIGINT, vote_count BIGINT, most_count BIGINT, "
-                "is_taken_here BOOLEAN, stretch_ns BIGINT)")  # fmt: skip
+    con.execute(
+        "CREATE OR REPLACE TABLE region (clock_id BIGINT, stretch BIGINT, least_ns BIGINT, "
+        "greatest_ns BIGINT, difference_ns BIGINT, vote_count BIGINT, most_count BIGINT, "
+        "is_taken_here BOOLEAN, stretch_ns BIGINT)"
+    )
     for stretch, regions in enumerate(stretches):
         most = max(votes for _, _, votes in regions)
         for difference, half, votes in regions:
             con.execute(
                 "INSERT INTO region VALUES (1, ?, ?, ?, ?, ?, ?, ?, ?)",
-                [stretch, difference - half, difference + half, difference, votes, most, is_here,
-                 STRETCH_NS],
-            )  # fmt: skip
+                [
+                    stretch,
+                    difference - half,
+                    difference + half,
+                    difference,
+                    votes,
+                    most,
+                    is_here,
+                    STRETCH_NS,
+                ],
+            )
     return con.execute(
         "SELECT difference_ns, message_count, segment FROM derive.followed_difference('region') "
         "ORDER BY stretch"
@@ -54,8 +66,10 @@ def followed(
 
 def drift(con: duckdb.DuckDBPyConnection, offsets: Sequence[int]) -> list[float]:
     """Drift of each stretch [ppb], of the differences in it."""
-    con.execute("CREATE OR REPLACE TABLE course (clock_id BIGINT, place BIGINT, stretch BIGINT, "
-                "at_ns BIGINT, offset_ns BIGINT)")  # fmt: skip
+    con.execute(
+        "CREATE OR REPLACE TABLE course (clock_id BIGINT, place BIGINT, stretch BIGINT, "
+        "at_ns BIGINT, offset_ns BIGINT)"
+    )
     for stretch, offset in enumerate(offsets):
         con.execute(
             "INSERT INTO course VALUES (1, 1, ?, ?, ?)", [stretch, stretch * STRETCH_NS, offset]
@@ -215,8 +229,10 @@ def sharp(
 ) -> list[tuple[int, int]]:
     """(difference, drift) by stretch, of intervals (stretch, least, greatest, so many)."""
     drift(con, offsets)
-    con.execute("CREATE OR REPLACE TABLE pair (clock_id BIGINT, stretch BIGINT, written_ns BIGINT, "
-                "least_ns BIGINT, greatest_ns BIGINT)")  # fmt: skip
+    con.execute(
+        "CREATE OR REPLACE TABLE pair (clock_id BIGINT, stretch BIGINT, written_ns BIGINT, "
+        "least_ns BIGINT, greatest_ns BIGINT)"
+    )
     for stretch, least, greatest, count in intervals:
         con.execute(
             "INSERT INTO pair SELECT 1, ?, ?, ?, ? FROM range(?)",
@@ -256,8 +272,10 @@ def test_of_equal_differences_the_greatest_is_sharp(
 def is_sharp(con: duckdb.DuckDBPyConnection, both: int, one: int, other: int) -> bool:
     """Of messages that allow two differences, only the first, and only the second."""
     drift(con, [0])
-    con.execute("CREATE OR REPLACE TABLE pair (clock_id BIGINT, stretch BIGINT, written_ns BIGINT, "
-                "least_ns BIGINT, greatest_ns BIGINT)")  # fmt: skip
+    con.execute(
+        "CREATE OR REPLACE TABLE pair (clock_id BIGINT, stretch BIGINT, written_ns BIGINT, "
+        "least_ns BIGINT, greatest_ns BIGINT)"
+    )
     shared = [(n, 1_000) for n in range(both)] + [(n - 4_000, 5_000) for n in range(both)]
     first = [(1_000 + n, 1_000) for n in range(one)]
     second = [(2_000 + n - 4_000, 5_000) for n in range(other)]
@@ -330,12 +348,15 @@ def test_what_came_before_is_known_where_no_take_shows_a_step(
     assert followed(rules, [old, old, both, both])[:3] == [(0, 20, 0), (0, 20, 0), (0, 0, 0)]
 
 
-@pytest.mark.parametrize(("until_next", "until_later", "is_jump"), [
-    (190_000, 200_000, True),
-    (210_000, 200_000, False),
-    (150_000, 290_000, True),
-    (150_000, 310_000, False),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("until_next", "until_later", "is_jump"),
+    [
+        (190_000, 200_000, True),
+        (210_000, 200_000, False),
+        (150_000, 290_000, True),
+        (150_000, 310_000, False),
+    ],
+)
 def test_what_agrees_with_a_jump_may_drift(
     rules: duckdb.DuckDBPyConnection, until_next: int, until_later: int, *, is_jump: bool
 ) -> None:
@@ -343,9 +364,15 @@ def test_what_agrees_with_a_jump_may_drift(
     jump = 3_000_000
     found = followed(
         rules,
-        [[(0, 0, 20)], [(jump, 0, 20)], [(jump + until_next, 0, 20)],
-         [(jump + until_later, 0, 20)], [(9_000_000, 0, 20)], [(1_000_000, 0, 20)]],
-    )  # fmt: skip
+        [
+            [(0, 0, 20)],
+            [(jump, 0, 20)],
+            [(jump + until_next, 0, 20)],
+            [(jump + until_later, 0, 20)],
+            [(9_000_000, 0, 20)],
+            [(1_000_000, 0, 20)],
+        ],
+    )
     assert found[1] == ((jump, 20, 1) if is_jump else (0, 0, 0))
 
 

@@ -74,9 +74,13 @@ def test_each_host_counts_its_own(con: duckdb.DuckDBPyConnection) -> None:
     thread(con, 1, "x", "y", "x")
     thread(con, 2, "q", "r", "q", trace=3)
     assert given(con) == [
-        (1, 7, "x", -1), (1, 7, "y", -2), (2, 7, "x", -1), (2, 7, "y", -2),
-        (3, 7, "q", -1), (3, 7, "r", -2),
-    ]  # fmt: skip
+        (1, 7, "x", -1),
+        (1, 7, "y", -2),
+        (2, 7, "x", -1),
+        (2, 7, "y", -2),
+        (3, 7, "q", -1),
+        (3, 7, "r", -2),
+    ]
 
 
 def test_all_threads_of_a_name_are_of_its_process(con: duckdb.DuckDBPyConnection) -> None:

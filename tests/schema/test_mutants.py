@@ -64,8 +64,11 @@ def test_a_change_is_noticed_by_the_tests_that_are_about_it(
 ) -> None:
     done = subprocess.run(
         [sys.executable, "benchmarks/mutants.py", file, *options, "--tests", tests],
-        cwd=ROOT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert f"{changes} changes, {survived} survived" in done.stdout, done.stdout + done.stderr
     assert done.returncode == (survived > 0)
 

@@ -41,9 +41,13 @@ def on_one_thread(left: Sequence[int], right: Sequence[int]) -> list[tuple[int, 
 
 @pytest.mark.parametrize(
     ("right", "is_same"),
-    [([0, 1_500, 2_500, 3_000], True), ([0, 1_500, 2_500, 2_700, 3_000], True),
-     ([0, 1_500, 2_500, 3_005], True), ([0, 1_500, 2_500, 2_985], False)],
-)  # fmt: skip
+    [
+        ([0, 1_500, 2_500, 3_000], True),
+        ([0, 1_500, 2_500, 2_700, 3_000], True),
+        ([0, 1_500, 2_500, 3_005], True),
+        ([0, 1_500, 2_500, 2_985], False),
+    ],
+)
 def test_half_of_the_events_have_a_twin(right: list[int], is_same: bool) -> None:
     """Of those of the session that has fewer."""
     assert on_one_thread([0, 1_000, 2_000, 3_000], right) == [(0, 1, is_same)]
@@ -71,9 +75,9 @@ def test_only_the_time_in_which_both_recorded_counts() -> None:
 def test_a_twin_is_of_the_same_thread_and_tracepoint() -> None:
     even, odd = [0, 1_000, 2_000], [500, 1_500, 2_500]
     for other in ((2, 1), (1, 2)):
-        assert pairs(
-            {(0, 1, 1): even, (0, *other): odd, (1, 1, 1): odd, (1, *other): even}
-        ) == [(0, 1, False)]  # fmt: skip
+        assert pairs({(0, 1, 1): even, (0, *other): odd, (1, 1, 1): odd, (1, *other): even}) == [
+            (0, 1, False)
+        ]
 
 
 def test_a_twin_is_of_the_same_cpu() -> None:

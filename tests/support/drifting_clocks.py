@@ -75,9 +75,13 @@ def fill_clocks(
             rows.append((*place, sent, taken, int(way.is_packet)))
     names = ("id", "sender", "receiver", "sent_ns", "taken_ns", "is_packet")
     passed = pyarrow.table(
-        {name: pyarrow.array(list(column), "int64")
-         for name, column in zip(names, zip(*rows, strict=True) if rows else [()] * 6, strict=True)}
-    )  # fmt: skip
+        {
+            name: pyarrow.array(list(column), "int64")
+            for name, column in zip(
+                names, zip(*rows, strict=True) if rows else [()] * 6, strict=True
+            )
+        }
+    )
     connection.register("passed", passed)
     connection.execute("CREATE TEMP VIEW message AS FROM passed WHERE is_packet = 0")
     connection.execute(

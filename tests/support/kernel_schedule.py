@@ -49,9 +49,17 @@ class Kernel:
     ) -> int:
         """Let a thread take the CPU from another one."""
         return self.add(
-            "sched_switch", ts, cpu, ids, prev_tid=before, prev_prio=20, prev_state=state,
-            next_tid=after, next_prio=19, next_comm=f"thread {after}",
-        )  # fmt: skip
+            "sched_switch",
+            ts,
+            cpu,
+            ids,
+            prev_tid=before,
+            prev_prio=20,
+            prev_state=state,
+            next_tid=after,
+            next_prio=19,
+            next_comm=f"thread {after}",
+        )
 
     def wake(self, ts: int, tid: int, cpu: int = 0, target_cpu: int = 0) -> int:
         return self.add("sched_waking", ts, cpu, tid=tid, target_cpu=target_cpu)

@@ -83,8 +83,9 @@ class Network:
     ) -> None:
         """Send a packet that arrives, with a checksum that the network card may fill in."""
         addresses = {
-            "source": self.addresses[sender], "destination": self.addresses[receiver],
-        }  # fmt: skip
+            "source": self.addresses[sender],
+            "destination": self.addresses[receiver],
+        }
         packet = Header(**{**addresses, **header})  # type: ignore[arg-type]
         self.sent(sender, time, packet)
         if checksum_is_filled_in:
@@ -130,17 +131,24 @@ def traffic(network: Network, seconds: float) -> int:
             ports = (40_000 + way, 7411)
             udp: dict[str, object] = {"protocol": UDP, "ports": ports, "length": 200}
             tcp: dict[str, object] = {
-                "protocol": TCP, "ports": ports, "identification": number,
-                "sequence": 1460 * number, "acknowledgement": 77,
-            }  # fmt: skip
+                "protocol": TCP,
+                "ports": ports,
+                "identification": number,
+                "sequence": 1460 * number,
+                "acknowledgement": 77,
+            }
             if kind == "tcp":
                 network.carry(sender, receiver, time, **tcp, checksum_is_filled_in=True)
                 count += 1
             elif kind == "udp":
                 network.carry(
-                    sender, receiver, time, **udp, identification=number + 1,
+                    sender,
+                    receiver,
+                    time,
+                    **udp,
+                    identification=number + 1,
                     checksum_is_filled_in=True,
-                )  # fmt: skip
+                )
                 count += 1
             elif kind == "plain":  # small datagrams have no identification, but a checksum
                 network.carry(
@@ -163,7 +171,12 @@ def traffic(network: Network, seconds: float) -> int:
                 network.carry("gamma", receiver, time + 5_000, **udp, identification=number + 1)
             else:  # nothing tells it from others: the card fills in the checksum
                 network.carry(
-                    sender, receiver, time, **udp, identification=0, checksum=4711,
+                    sender,
+                    receiver,
+                    time,
+                    **udp,
+                    identification=0,
+                    checksum=4711,
                     checksum_is_filled_in=True,
-                )  # fmt: skip
+                )
     return count

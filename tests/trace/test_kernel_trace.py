@@ -84,13 +84,21 @@ def test_headers_are_read(tmp_path: Path, read_rows: Read) -> None:
     names = list(WANTED[SENT].names)
     assert [[row[name] for name in names] for row in rows] == [
         [
-            [0xFE80, 0, 0, 0, 0, 0, 0, 1], [0xFE80, 0, 0, 0, 0, 0, 0, 0xABCD],
-            None, None, 1, 2, 2**32 - 2, 3, None, None,
+            [0xFE80, 0, 0, 0, 0, 0, 0, 1],
+            [0xFE80, 0, 0, 0, 0, 0, 0, 0xABCD],
+            None,
+            None,
+            1,
+            2,
+            2**32 - 2,
+            3,
+            None,
+            None,
         ],
         [[10, 0, 0, 1], [10, 0, 0, 255], 6, 0x4000, 4, 5, None, None, 108, 7],
         [None] * 10,
         [[10, 0, 0, 1], [10, 0, 0, 2], 1, 0x4000, *[None] * 6],
-    ]  # fmt: skip
+    ]
 
 
 def test_the_cpu_of_a_frequency_is_not_that_of_its_event(tmp_path: Path, read_rows: Read) -> None:

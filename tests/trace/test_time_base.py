@@ -74,8 +74,14 @@ def test_errors_of_measuring_are_left_alone(tmp_path: Path, open_traces: Open) -
     with open_traces(tmp_path) as traces:
         assert [info.clock_correction_ns for info in traces.traces] == [0, 0, 0, 1_001, -1_001]
         events, _ = read(traces)
-    assert sorted(events) == [(0, 10_010), (0, 10_011), (1, 9_015), (2, 11_016), (3, 10_017),
-                              (4, 10_018)]  # fmt: skip
+    assert sorted(events) == [
+        (0, 10_010),
+        (0, 10_011),
+        (1, 9_015),
+        (2, 11_016),
+        (3, 10_017),
+        (4, 10_018),
+    ]
 
 
 def test_another_boot_keeps_its_offset(tmp_path: Path, open_traces: Open) -> None:
@@ -97,8 +103,13 @@ def test_a_clock_of_its_own_in_an_equal_boot_keeps_its_offset(
         assert [info.clock_correction_ns for info in traces.traces] == [0, 0, 0]
         assert [info.clock_uuid is None for info in traces.traces] == [False, True, True]
         assert [time for _, time in read(traces)[0]] == [
-            1_000_010, 1_000_015, 1_000_016, 1_000_017, 1_000_030, 1_000_040,
-        ]  # fmt: skip
+            1_000_010,
+            1_000_015,
+            1_000_016,
+            1_000_017,
+            1_000_030,
+            1_000_040,
+        ]
 
 
 def test_hosts_of_one_clock_that_was_set_are_on_one_base(tmp_path: Path, open_traces: Open) -> None:

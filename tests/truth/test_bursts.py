@@ -227,9 +227,13 @@ def test_where_all_topics_have_one_period(
 ) -> None:
     """Each message could be of any period: the right difference has the most votes by a few."""
     simulation = simulate(
-        "container", tmp_path / "trace", factor=factor, layout="humble", recording=recording,
+        "container",
+        tmp_path / "trace",
+        factor=factor,
+        layout="humble",
+        recording=recording,
         clock_offset_ns=350_000_000,
-    )  # fmt: skip
+    )
     path = tmp_path / "run.duckdb"
     ingest_one(simulation.directory, path).connection.close()
     score = {score.kind: score for score in compare_simulated(path, simulation.truth)[0]}

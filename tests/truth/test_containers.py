@@ -27,10 +27,19 @@ def test_processes_with_equal_ids_are_told_apart(tmp_path: Path, name: str) -> N
         for score in scores
         if score.kind != "excused"
     } == dict.fromkeys(
-        ("callback_instance", "callback_run", "called_with", "direct", "executor_state", "kind",
-         "publication", "take", "transport"),
+        (
+            "callback_instance",
+            "callback_run",
+            "called_with",
+            "direct",
+            "executor_state",
+            "kind",
+            "publication",
+            "take",
+            "transport",
+        ),
         (0, 0, 0, 0),
-    )  # fmt: skip
+    )
     assert all(drop.is_right or drop.undecided for drop in drops or [])
     assert [finding.severity for finding in report.findings if "ids" in finding.name] == ["info"]
 

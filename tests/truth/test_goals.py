@@ -54,9 +54,12 @@ def test_goals_of_real_nodes_that_stand_still_at_times(tmp_path: Path) -> None:
     )
     ingested.connection.close()
     assert decided == [
-        ("/dock", False, 7), ("/dock", True, 16), ("/dock", None, 18),
-        ("/move", False, 6), ("/move", True, 28),
-    ]  # fmt: skip
+        ("/dock", False, 7),
+        ("/dock", True, 16),
+        ("/dock", None, 18),
+        ("/move", False, 6),
+        ("/move", True, 28),
+    ]
     assert_right(compare_real(tmp_path / "run.duckdb", STALLED / "truth.jsonl.gz"))
 
 

@@ -12,9 +12,16 @@ def _judged(
 ) -> Judged:
     values = {"misguessed": 0, "repeated": 0, "missing": 0, "doubted": 0, "recall": 1.0, **others}
     score = Score(
-        "transport", found, found, found, wrong, loss_affected, **values,
-        precision=1 - wrong / found, labels="",
-    )  # fmt: skip
+        "transport",
+        found,
+        found,
+        found,
+        wrong,
+        loss_affected,
+        **values,
+        precision=1 - wrong / found,
+        labels="",
+    )
     return Judged(system, "iron", "loss", score)
 
 

@@ -204,8 +204,11 @@ def test_a_chain_of_three_processes(trace: Path, tmp_path: Path) -> None:
             ("delivered", 200)
         ]
         assert rows("SELECT full_name FROM node ORDER BY 1") == [
-            ("/agnocast_bridge",), ("/bridge",), ("/filter",), ("/sensor",),
-        ]  # fmt: skip
+            ("/agnocast_bridge",),
+            ("/bridge",),
+            ("/filter",),
+            ("/sensor",),
+        ]
         assert rows("SELECT period_ns FROM timer") == [(2_000_000,)]
         assert rows("SELECT DISTINCT kind, is_inferred FROM executor") == [
             ("agnocast_only_single_threaded_executor", False)

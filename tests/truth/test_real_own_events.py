@@ -98,6 +98,7 @@ def test_every_event_is_there_with_its_fields_and_its_callback(trace: Path, tmp_
         ]
         # Babeltrace before 2.0.5 shows the text of an earlier event in place of an empty one.
         assert [label for *_, label in events if label] == [
-            fields["label"] or label for (_, fields), (*_, label) in zip(found, events, strict=True)
+            fields["label"] or label
+            for (_, fields), (*_, label) in zip(found, events, strict=True)
             if label
-        ]  # fmt: skip
+        ]

@@ -249,9 +249,11 @@ def test_reasons_are_judged_where_the_trace_decides_them(losses):
     # Nothing is missing.
     assert not any(drop.undecided == "events are missing" for drop in drops)
     assert {drop.undecided for drop in drops if not drop.is_right} <= {
-        "nothing later taken", "nothing earlier taken", "no event of expiry",
+        "nothing later taken",
+        "nothing earlier taken",
+        "no event of expiry",
         "no event of destruction",
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.thorough
@@ -351,9 +353,13 @@ STEPS = Recording(realtime_steps=((200_000_000, 7_000), (500_000_000, -40_000_00
 )
 def test_what_a_trace_leaves_open_is_excused(tmp_path, system, layout, factor, recording):
     simulation = simulate(
-        system, tmp_path / "trace",
-        layout=layout, factor=factor, recording=recording, clock_offset_ns=350_000_000,
-    )  # fmt: skip
+        system,
+        tmp_path / "trace",
+        layout=layout,
+        factor=factor,
+        recording=recording,
+        clock_offset_ns=350_000_000,
+    )
     path = tmp_path / "run.duckdb"
     ingest_one(simulation.directory, path).connection.close()
     scores, drops = compare_simulated(path, simulation.truth)

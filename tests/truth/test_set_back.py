@@ -28,9 +28,12 @@ def test_no_wrong_link_and_a_finding(
     tmp_path: Path, system: str, factor: float, at_ms: int, linked: float, told: str
 ) -> None:
     simulation = simulate(
-        system, tmp_path / "trace", factor=factor, layout="humble",
+        system,
+        tmp_path / "trace",
+        factor=factor,
+        layout="humble",
         recording=Recording(realtime_steps=((at_ms * MILLISECOND, -40 * MILLISECOND),)),
-    )  # fmt: skip
+    )
     database = tmp_path / "run.duckdb"
     findings = ingest([simulation.directory], database).findings
     (score,) = (

@@ -34,9 +34,12 @@ def test_stored_messages_are_counted_and_not_measured(overload: Ingested) -> Non
     ] * 3
     topics = {row["topic_name"]: row for row in rows(overload, "topics-latency")}
     assert {name: (row["linked"], row["stored"]) for name, row in topics.items()} == {
-        "/fast": (186, 0), "/map": (5, 5), "/plain": (32, 0), "/sensor": (145, 0),
+        "/fast": (186, 0),
+        "/map": (5, 5),
+        "/plain": (32, 0),
+        "/sensor": (145, 0),
         "/slow_out": (100, 0),
-    }  # fmt: skip
+    }
     assert topics["/map"]["max_ns"] is None
 
 

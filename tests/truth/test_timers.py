@@ -66,12 +66,16 @@ OVERLOADED = Scenario(
         Process("source", "alpha", 1101, (_SOURCE,)),
         Process("busy", "alpha", 1201, (_BUSY,), start_ns=3 * MILLISECOND),
         Process(
-            "shared", "alpha", 1301, (_SHARED,), start_ns=5 * MILLISECOND,
+            "shared",
+            "alpha",
+            1301,
+            (_SHARED,),
+            start_ns=5 * MILLISECOND,
             executors=(Executor("multi_threaded", 2),),
         ),
     ),
     duration_ns=10 * SECOND,
-)  # fmt: skip
+)
 
 
 @dataclass

@@ -32,18 +32,22 @@ from msgflow.verify.verify import Verification
         ("targets:\n  - topic: /a\n    rate: [< 1 Hz, < 2 Hz]", 3, "required twice", "line 3"),
         (
             "targets:\n  - topic: /a\n    rate: < 1 Hz\n  - topic: /a\n    rate: 2 Hz ± 1 %",
-            5, "rate of this topic is required twice", "line 3",
+            5,
+            "rate of this topic is required twice",
+            "line 3",
         ),
         ("targets:\n  - path: /a\n    latency: p99 < 1 s", 2, "two topics", "targets:"),
         (
             "targets:\n  - path: [/a, /b,\n      /a]\n    latency: p99 < 1 s",
-            3, "a path does not come to a topic twice — /a", "loops",
+            3,
+            "a path does not come to a topic twice — /a",
+            "loops",
         ),
         ("targets:\n  - topic: /a\n    rate: > 1 Hz", 3, "expected", "quote"),
         ("targets:\n  - topic: *.raw\n    rate: < 1 Hz", 2, "alias", "quote"),
         ("targets: &a\n  - *a", 1, "not a mapping", "targets:"),
     ],
-)  # fmt: skip
+)
 def test_a_mistake_is_named_with_its_line(
     tmp_path: Path, text: str, line: int, message: str, hint: str
 ) -> None:

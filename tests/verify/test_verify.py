@@ -136,11 +136,16 @@ targets:
 """
     failed, missing, passed = rows(check(text, goals))
     assert (failed["verdict"], failed["subject"], failed["value"], failed["samples"]) == (
-        "failed", "/asking → /dock", 1_927_850, 157
-    )  # fmt: skip
+        "failed",
+        "/asking → /dock",
+        1_927_850,
+        157,
+    )
     assert (failed["worst_ns"], passed["verdict"], passed["value"]) == (
-        1_927_850, "passed", 1_921_100
-    )  # fmt: skip
+        1_927_850,
+        "passed",
+        1_921_100,
+    )
     assert failed["see"].startswith("msgflow flow --request 1")
     assert missing["reason"] == "nothing of this action was measured in the time window"
     with Database(goals) as database:
@@ -286,8 +291,10 @@ def test_a_run_meets_what_is_suggested_from_it(
     assert "rate" in kinds
     assert not any("/_action/" in row["target"] for row in rows(verification))
     assert {
-        "demo": {"latency", "completeness"}, "services": {"round_trip"}, "actions": {"goal"},
-    }[name] <= kinds  # fmt: skip
+        "demo": {"latency", "completeness"},
+        "services": {"round_trip"},
+        "actions": {"goal"},
+    }[name] <= kinds
 
 
 @pytest.mark.thorough
@@ -334,8 +341,11 @@ def test_junit_has_a_case_per_verdict(check: Check) -> None:
     verification = check(text)
     root = ElementTree.fromstring(verification.to_junit())
     assert {key: root.attrib[key] for key in ("tests", "failures", "errors", "skipped")} == {
-        "tests": "3", "failures": "1", "errors": "1", "skipped": "0",
-    }  # fmt: skip
+        "tests": "3",
+        "failures": "1",
+        "errors": "1",
+        "skipped": "0",
+    }
     tags = [[child.tag for child in case] for case in root.iter("testcase")]
     assert tags == [["failure"], ["error"], []]
     failure = next(root.iter("failure"))
@@ -359,8 +369,12 @@ def test_hostile_names_are_text_in_junit(system: Path, tmp_path: Path) -> None:
     root = ElementTree.fromstring(text)
     assert len(list(root.iter("testcase"))) > 8
     assert {element.tag for element in root.iter()} <= {
-        "testsuites", "testsuite", "testcase", "failure", "error",
-    }  # fmt: skip
+        "testsuites",
+        "testsuite",
+        "testcase",
+        "failure",
+        "error",
+    }
     for element in root.iter():
         for value in element.attrib.values():
             assert value.isprintable()
@@ -417,10 +431,12 @@ def test_a_path_may_have_a_name_of_its_file(system: Path, tmp_path: Path, check:
         (
             "targets:\n  - path: there\n    latency: max < 1 s\n  - path: there\n"
             "    latency: max < 2 s",
-            5, "required twice", "line 3",
+            5,
+            "required twice",
+            "line 3",
         ),
     ],
-)  # fmt: skip
+)
 def test_a_wrong_name_of_a_path_is_named_with_its_line(
     system: Path, tmp_path: Path, text: str, line: int, message: str, hint: str
 ) -> None:
@@ -459,10 +475,12 @@ targets:
         ("/planner Timer(5 ms)", "p99 < 180 ns"): ("failed", 180, None),
         ("/planner Timer(5 ms)", "< 24 %"): ("passed", 140 / 600, None),
         ("/planner Subscription(/goal)", "< 50 %"): (
-            "failed", 0.6, "msgflow flow --callback-instance 5",
+            "failed",
+            0.6,
+            "msgflow flow --callback-instance 5",
         ),
         ("/planner, thread 1", "p99 < 31 ns"): ("passed", 30, None),
         ("/planner, thread 1", "p99 < 30 ns"): ("failed", 30, None),
-    }  # fmt: skip
+    }
     without = rows(check(text))
     assert {row["verdict"] for row in without} == {"not measured"}

@@ -24,8 +24,14 @@ from msgflow.view import report as report_module
 from msgflow.view.pages import Pages
 
 PAGES = (
-    "overview", "paths", "timeline", "graph", "nodes", "topics", "compare",
-)  # fmt: skip
+    "overview",
+    "paths",
+    "timeline",
+    "graph",
+    "nodes",
+    "topics",
+    "compare",
+)
 
 
 @pytest.fixture(autouse=True)

@@ -124,20 +124,40 @@ def require_critical_path_of_the_query(page: Page, database: Path, run: int) -> 
 @pytest.mark.parametrize(
     ("run", "kind", "which"),
     [
-        thorough(3, "publication", "SELECT min(publication_id) FROM publication JOIN publisher"
-         " USING (publisher_id) WHERE publication.run_id = 3 AND topic_name = '/FrontLidarDriver'"),
-        thorough(3, "take", "SELECT quantile_disc(take_id, 0.5) FROM take JOIN subscription USING"
-         " (subscription_id) WHERE take.run_id = 3 AND topic_name = '/VehicleInterface'"),
-        thorough(3, "callback_instance", "SELECT min(callback_instance_id) FROM link_causal"
-         " WHERE run_id = 3 AND kind = 'periodic_async'"),
-        thorough(2, "publication", "SELECT quantile_disc(publication_id, 0.5) FROM publication JOIN"
-         " publisher USING (publisher_id) WHERE publication.run_id = 2"
-         " AND topic_name = '/RayGroundFilter'"),
-        thorough(1, "request", "SELECT quantile_disc(l.request_id, 0.5) FROM link_request AS l"
-         " JOIN callback_instance AS i USING (callback_instance_id)"
-         " JOIN link_causal AS c USING (callback_instance_id) WHERE l.run_id = 1"),
+        thorough(
+            3,
+            "publication",
+            "SELECT min(publication_id) FROM publication JOIN publisher USING (publisher_id)"
+            " WHERE publication.run_id = 3 AND topic_name = '/FrontLidarDriver'",
+        ),
+        thorough(
+            3,
+            "take",
+            "SELECT quantile_disc(take_id, 0.5) FROM take JOIN subscription USING"
+            " (subscription_id) WHERE take.run_id = 3 AND topic_name = '/VehicleInterface'",
+        ),
+        thorough(
+            3,
+            "callback_instance",
+            "SELECT min(callback_instance_id) FROM link_causal"
+            " WHERE run_id = 3 AND kind = 'periodic_async'",
+        ),
+        thorough(
+            2,
+            "publication",
+            "SELECT quantile_disc(publication_id, 0.5) FROM publication JOIN"
+            " publisher USING (publisher_id) WHERE publication.run_id = 2"
+            " AND topic_name = '/RayGroundFilter'",
+        ),
+        thorough(
+            1,
+            "request",
+            "SELECT quantile_disc(l.request_id, 0.5) FROM link_request AS l"
+            " JOIN callback_instance AS i USING (callback_instance_id)"
+            " JOIN link_causal AS c USING (callback_instance_id) WHERE l.run_id = 1",
+        ),
     ],
-)  # fmt: skip
+)
 def test_the_critical_path_of_any_vertex_is_that_of_the_query(
     run: int, kind: str, which: str, systems: Path, read: Read, serve: Serve, page: Page
 ) -> None:

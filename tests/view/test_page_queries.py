@@ -61,15 +61,18 @@ def test_bars_are_the_instances_of_the_views(demo: Path, read: Read) -> None:
     bars = run_page_query(connection, "segments", values(connection))
     connection.register("bars", bars)
     ((origin,),) = connection.execute("SELECT start_ns FROM run").fetchall()
-    for kind, sql in enumerate((
-        "SELECT callback_instance_id, start_ns, coalesce(end_ns, start_ns) FROM callback_instance",
-        "SELECT publication_id, start_ns, end_ns FROM publication",
-        "SELECT take_id, taken_ns, taken_ns FROM take",
-        "SELECT request_id, coalesce(sent_ns, taken_ns), coalesce(taken_ns, sent_ns)"
-        " FROM request",
-        "SELECT response_id, coalesce(sent_ns, taken_ns), coalesce(taken_ns, sent_ns)"
-        " FROM response",
-    )):  # fmt: skip
+    for kind, sql in enumerate(
+        (
+            "SELECT callback_instance_id, start_ns, coalesce(end_ns, start_ns)"
+            " FROM callback_instance",
+            "SELECT publication_id, start_ns, end_ns FROM publication",
+            "SELECT take_id, taken_ns, taken_ns FROM take",
+            "SELECT request_id, coalesce(sent_ns, taken_ns), coalesce(taken_ns, sent_ns)"
+            " FROM request",
+            "SELECT response_id, coalesce(sent_ns, taken_ns), coalesce(taken_ns, sent_ns)"
+            " FROM response",
+        )
+    ):
         drawn = (
             f"SELECT id, start_at + {origin}, start_at + length + {origin}"
             f" FROM bars WHERE kind = {kind}"

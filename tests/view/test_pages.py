@@ -18,9 +18,14 @@ Read = Callable[[Path], duckdb.DuckDBPyConnection]
 Report = Callable[..., str]
 Serve = Callable[[Path], Served]
 SELDOM = (
-    "superseded", "no_output", "not_connected", "unknown", "cut_by_recording", "loss_affected",
+    "superseded",
+    "no_output",
+    "not_connected",
+    "unknown",
+    "cut_by_recording",
+    "loss_affected",
     "ambiguous",
-)  # fmt: skip
+)
 
 
 def cells(page: Page, table: str) -> list[list[str]]:
@@ -126,9 +131,12 @@ def test_graph(
     wanted |= {row["publisher"] for row in rates} | {row["subscriber"] for row in latency}
     assert sorted(names) == sorted(
         list(wanted)
-        + [topic for topic in {row["topic_name"] for row in rates + latency}
-           if topic in {row["publisher"] for row in rates} | {row["subscriber"] for row in latency}]
-    )  # fmt: skip
+        + [
+            topic
+            for topic in {row["topic_name"] for row in rates + latency}
+            if topic in {row["publisher"] for row in rates} | {row["subscriber"] for row in latency}
+        ]
+    )
     titles = page.page.locator(".graph .edge title").all_text_contents()
     for row in latency:
         if row["median_ns"] is not None:
@@ -196,19 +204,28 @@ def test_executors(way: str, demo: Path, serve: Serve, report: Report, page: Pag
     assert page.page.locator("canvas.strip").count() == len(usage)
     page.page.locator("[data-section=executors] details.beside summary").first.click()
     durations = (
-        "seen_ns", "wait_ns", "select_ns", "take_ns", "callback_ns", "blocked_ns", "unknown_ns",
-    )  # fmt: skip
+        "seen_ns",
+        "wait_ns",
+        "select_ns",
+        "take_ns",
+        "callback_ns",
+        "blocked_ns",
+        "unknown_ns",
+    )
     assert [row[1:3] + row[6:13] for row in cells(page, "executor threads")] == [
         [row["nodes"], row["process"], *(shown(row[name]) for name in durations)] for row in usage
     ]
     found = {(row[0], row[1], row[2], row[3], row[7]) for row in cells(page, "interference")}
     assert found <= {
         (
-            row["node"], row["callback"], row["meanwhile_node"], row["meanwhile_callback"],
+            row["node"],
+            row["callback"],
+            row["meanwhile_node"],
+            row["meanwhile_callback"],
             shown(row["overlap_max_ns"]),
         )
         for row in blame
-    }  # fmt: skip
+    }
     assert found
     filled = page.page.locator("canvas.strip").first.evaluate(
         """canvas => {
@@ -251,11 +268,15 @@ def test_compare(systems: Path, serve: Serve, page: Page) -> None:
     rows = cells(page, "comparison")
     assert [row[:5] + row[8:9] for row in rows] == [
         [
-            row["subject"], row["statistic"] or "", shown(row["a_ns"]), shown(row["b_ns"]),
-            shown(row["difference_ns"]), row["verdict"],
+            row["subject"],
+            row["statistic"] or "",
+            shown(row["a_ns"]),
+            shown(row["b_ns"]),
+            shown(row["difference_ns"]),
+            row["verdict"],
         ]
         for row in as_compared(wanted, "B is longer", "B is shorter", "only in A", "only in B")
-    ][: len(rows)]  # fmt: skip
+    ][: len(rows)]
     subjects = {row["subject"] for row in wanted}
     said = page.page.locator("main").inner_text()
     assert f"{len({row['subject'] for row in differs})} callback" in said
@@ -279,11 +300,14 @@ def test_compare_shows_what_was_measured_before_intervals(
     rows = cells(page, "measured")
     assert [row[:5] for row in rows] == [
         [
-            row["subject"], row["statistic"], shown(row["a_ns"]), shown(row["b_ns"]),
+            row["subject"],
+            row["statistic"],
+            shown(row["a_ns"]),
+            shown(row["b_ns"]),
             shown(row["difference_ns"]),
         ]
         for row in as_compared(wanted, "only in A", "only in B")
-    ][: len(rows)]  # fmt: skip
+    ][: len(rows)]
     said = page.page.locator("main").inner_text()
     assert f"{len({row['subject'] for row in wanted})} callbacks measured" in said
     assert "confidence intervals" in said

@@ -56,14 +56,42 @@ def test_rows_of_any_names_and_types(demo: Path, serve: Serve) -> None:
         """,
     )
     assert found.meta["names"] == [
-        "rows", "rows_1", "meta", "__proto__", "a b", "n", "large", "exact", "most", "text", "list",
-        "struct", "bytes", "endless", "day", "kind",
-    ]  # fmt: skip
+        "rows",
+        "rows_1",
+        "meta",
+        "__proto__",
+        "a b",
+        "n",
+        "large",
+        "exact",
+        "most",
+        "text",
+        "list",
+        "struct",
+        "bytes",
+        "endless",
+        "day",
+        "kind",
+    ]
     (row,) = found.rows
     assert list(row.values()) == [
-        1, 2, 1.5, 3, True, None, 1e30, "9007199254740993", "18446744073709551615", "a", "[1, 2]",
-        '{"a": null}', "78", float("inf"), "2020-01-02", "b",
-    ]  # fmt: skip
+        1,
+        2,
+        1.5,
+        3,
+        True,
+        None,
+        1e30,
+        "9007199254740993",
+        "18446744073709551615",
+        "a",
+        "[1, 2]",
+        '{"a": null}',
+        "78",
+        float("inf"),
+        "2020-01-02",
+        "b",
+    ]
     assert ask(serve(demo), "SELECT 1 AS a WHERE false").rows == []
 
 
@@ -230,9 +258,11 @@ def test_the_editor_completes_views_and_columns(demo: Path, serve: Serve, page: 
     page.page.keyboard.type(" BY ")
     # A click on a name beside the text writes it there.
     page.page.get_by_label("show views with this text").fill("callback_instance")
-    names = page.page.get_by_label("views and columns").locator("details").filter(
-        has=page.page.get_by_role("button", name="callback_instance", exact=True)
-    )  # fmt: skip
+    names = (
+        page.page.get_by_label("views and columns")
+        .locator("details")
+        .filter(has=page.page.get_by_role("button", name="callback_instance", exact=True))
+    )
     names.locator("summary").first.click(position={"x": 5, "y": 8})
     names.get_by_role("button", name="start_ns", exact=True).first.click()
     page.page.keyboard.type(" LIMIT 3")
@@ -418,9 +448,14 @@ def test_a_row_leads_to_its_flow_in_its_run(
     systems: Path, serve: Serve, page: Page, read: Read, text: str, wanted: str | None
 ) -> None:
     row = read(systems).execute(text).fetchall()[0]
-    kind, number = (wanted, row[2 if wanted == "publication" else 1]) if wanted else (
-        "publication", 1,
-    )  # fmt: skip
+    kind, number = (
+        (wanted, row[2 if wanted == "publication" else 1])
+        if wanted
+        else (
+            "publication",
+            1,
+        )
+    )
     page.open(serve(systems).address)
     page.go(f"#/sql?run=3&text={quote(text)}")
     shown_rows(page)

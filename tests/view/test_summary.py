@@ -55,9 +55,10 @@ def test_its_numbers_are_those_of_the_command_beside_them(part: str, dropping: P
     if part == "blame":
         # Each command is of one flow, and ranks it first.
         assert [row.pop("rank") for row in own] == sorted(
-            place for place, command in enumerate(found.commands, 1)
+            place
+            for place, command in enumerate(found.commands, 1)
             for _ in printed(command, dropping)
-        )  # fmt: skip
+        )
         assert {row.pop("rank") for row in rows} == {1}
     assert rows == json_value(own)
     assert rows
@@ -200,8 +201,9 @@ def test_the_first_page_of_a_report_has_it(
     assert drops.locator("tbody tr").count() == len(section(dropping, "drops").result)
     # What makes data late comes first, and each finding is a line.
     assert [page.page.locator("h2").all_inner_texts()[at] for at in (0, 2)] == [
-        "What makes data late, or lets them get lost", "What is wrong with the recording",
-    ]  # fmt: skip
+        "What makes data late, or lets them get lost",
+        "What is wrong with the recording",
+    ]
     assert page.page.locator(".finding[open]").count() == 0
     # There is no tab that would show nothing.
     tabs = page.page.locator(".tabs a").all_inner_texts()

@@ -22,11 +22,14 @@ WHOLE = st.integers(-LARGEST_EXACT, LARGEST_EXACT)
 @given(
     st.lists(
         st.tuples(
-            st.none() | WHOLE, st.none() | TEXT, st.none() | st.booleans(),
-            st.none() | st.floats(allow_nan=False), st.none() | st.lists(TEXT, max_size=3),
+            st.none() | WHOLE,
+            st.none() | TEXT,
+            st.none() | st.booleans(),
+            st.none() | st.floats(allow_nan=False),
+            st.none() | st.lists(TEXT, max_size=3),
         )
     )
-)  # fmt: skip
+)
 def test_what_goes_in_comes_out(rows: list[tuple[object, ...]]) -> None:
     types = (pa.int64(), pa.string(), pa.bool_(), pa.float64(), pa.list_(pa.string()))
     names = ("whole", "text", "truth", "real", "several")

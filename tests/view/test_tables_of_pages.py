@@ -30,9 +30,17 @@ Serve = Callable[[Path], Served]
 SECOND = 1_000_000_000
 REAL = ["real_overload", "real_py_mixed", "real_services", "real_lifecycle", "real_reference"]
 SHOWN = (
-    "callbacks", "waits", "topics-summary", "topics-rate", "topics-delivery", "topics-latency",
-    "timers", "service-latency", "action-latency", "info-nodes",
-)  # fmt: skip
+    "callbacks",
+    "waits",
+    "topics-summary",
+    "topics-rate",
+    "topics-delivery",
+    "topics-latency",
+    "timers",
+    "service-latency",
+    "action-latency",
+    "info-nodes",
+)
 WINDOWS: tuple[dict[str, str], ...] = (
     {},
     {"start": "500000000"},

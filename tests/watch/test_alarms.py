@@ -260,9 +260,13 @@ def test_sessions_of_one_name_on_two_hosts_are_kept(tmp_path: Path) -> None:
     (chunks[0].path / "loop").symlink_to(chunks[0].path)
     os.mkfifo(chunks[0].path / "pipe")
     recorder = FlightRecorder(
-        tmp_path / "kept", most=1, window_ns=SECOND, earlier_ns=0, clock_sync="none",
+        tmp_path / "kept",
+        most=1,
+        window_ns=SECOND,
+        earlier_ns=0,
+        clock_sync="none",
         note=notes.append,
-    )  # fmt: skip
+    )
     traces = KeptTraces([], [chunk for chunk in read if chunk is not None])
     recorder.keep(SECOND, traces, [chunk.path for chunk in chunks], None, None)
     recorder.close()
@@ -302,11 +306,18 @@ def judged(monkeypatch: pytest.MonkeyPatch, *windows: Rows) -> list[tuple[Rows, 
     for number, failed in enumerate(windows):
         rows = [
             {
-                "target": "drive", "metric": "latency", "condition": "max < 80 ms",
-                "verdict": Verdict.FAILED, "value": 1.0, "measured": "", "see": None, "path": None,
-            } | row
+                "target": "drive",
+                "metric": "latency",
+                "condition": "max < 80 ms",
+                "verdict": Verdict.FAILED,
+                "value": 1.0,
+                "measured": "",
+                "see": None,
+                "path": None,
+            }
+            | row
             for row in failed
-        ]  # fmt: skip
+        ]
         verified = SimpleNamespace(result=SimpleNamespace(table=pa.Table.from_pylist(rows)))
         monkeypatch.setattr("msgflow.watch.alarm.verify", lambda *_, v=verified, **__: v)
         window = Window((number - 10) * SECOND, number * SECOND)
@@ -362,8 +373,10 @@ def test_paths_of_one_target_are_told_apart(monkeypatch) -> None:
 
     first, second = row("/a → /x → /b"), row("/c → /x → /b")
     assert told(monkeypatch, [first], [first, second], [first, second]) == [
-        ["drive"], ["drive"], [],
-    ]  # fmt: skip
+        ["drive"],
+        ["drive"],
+        [],
+    ]
 
 
 @pytest.mark.thorough

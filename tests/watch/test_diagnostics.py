@@ -19,11 +19,19 @@ from msgflow.watch.window_report import WindowReport
 
 PATH = "/camera → /image → /detector"
 ROW = {
-    "target": "image", "subject": PATH, "metric": "latency", "condition": "p99 < 10 ms",
-    "measured": "61.000 ms", "value": 61e6, "worst_ns": 70_000_000, "reason": None, "path": PATH,
-    "culprit": "/detector ran 60.000 ms", "why": None,
+    "target": "image",
+    "subject": PATH,
+    "metric": "latency",
+    "condition": "p99 < 10 ms",
+    "measured": "61.000 ms",
+    "value": 61e6,
+    "worst_ns": 70_000_000,
+    "reason": None,
+    "path": PATH,
+    "culprit": "/detector ran 60.000 ms",
+    "why": None,
     "flows": {"median_ns": 50_000_000, "p99_ns": 61_000_000, "lost": 2, "dropped": 1},
-}  # fmt: skip
+}
 
 
 class Said(SimpleNamespace):
@@ -95,8 +103,11 @@ def test_a_target_is_a_status(published: list[Any]) -> None:
         "; why: the CPU is busy"
     )
     assert {each.key: each.value for each in image.values} == {
-        "p50": "50.000 ms", "p99": "61.000 ms", "lost": "3", "lag": "0.4 s",
-    }  # fmt: skip
+        "p50": "50.000 ms",
+        "p99": "61.000 ms",
+        "lost": "3",
+        "lag": "0.4 s",
+    }
     assert [each.level for each in (scan, imu, odom)] == [b"\0", b"\3", b"\1"]
     assert imu.message == f"{PATH}: latency p99 < 10 ms: silent"
     assert [each.key for each in scan.values] == ["lag"]

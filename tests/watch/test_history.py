@@ -122,8 +122,12 @@ def test_what_came_before_is_forgotten_later() -> None:
     history = filled(100, 200, 300, 400, 500, 600)
     window = Window(400, 500)
     assert [path.name for path in history.paths(window, earlier_ns=100)] == [
-        "100", "200", "300", "400", "500",
-    ]  # fmt: skip
+        "100",
+        "200",
+        "300",
+        "400",
+        "500",
+    ]
     assert [path.name for path in history.close(window, earlier_ns=100)] == ["0"]
     # The window itself needs no more than before.
     assert [path.name for path in history.paths(window)] == ["200", "300", "400", "500"]

@@ -53,8 +53,9 @@ def test_what_most_windows_have_shown_counts_where_one_doubts_it() -> None:
     assert (link.kind, link.node.value) == ("direct", "/filter")
     assert (link.process.value, link.host.value) == ("42", "robot")
     assert ([each.value for each in link.inputs], [each.value for each in link.outputs]) == (
-        ["/scan"], ["/filtered"]
-    )  # fmt: skip
+        ["/scan"],
+        ["/filtered"],
+    )
     of_user = "links: [{kind: direct, node: /filter, inputs: [/scan], outputs: [/rosout]}]"
     both = with_learned(read_links(Path("links.yaml"), of_user), learned).links
     assert [each.outputs[0].value for each in both] == ["/rosout", "/filtered"]

@@ -156,10 +156,14 @@ def test_the_sum_of_latencies_does_not_fall_and_losses_have_reasons(
 
 def shown(*violations: dict[str, str], lag_s: float | None = None) -> WindowReport:
     return WindowReport(
-        window=Window(0, SECOND), paths=(), executors=(), losses=(),
+        window=Window(0, SECOND),
+        paths=(),
+        executors=(),
+        losses=(),
         discarded_events=0,
-        violations=violations, lag_s=lag_s,
-    )  # fmt: skip
+        violations=violations,
+        lag_s=lag_s,
+    )
 
 
 def test_busy_threads_go_by_their_nodes() -> None:
@@ -213,12 +217,16 @@ def test_what_has_gone_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
         exporter._losses[path, "[a 1]", "lost", "?"] = 1
         exporter.show(shown({"subject": path, "metric": "latency"}))
     assert metrics(exporter, "msgflow_path_flows") == {
-        ("/p0", "reached"): 1, ("/p0", "lost"): 1, ("/p3", "reached"): 1, ("/p3", "lost"): 1,
-    }  # fmt: skip
+        ("/p0", "reached"): 1,
+        ("/p0", "lost"): 1,
+        ("/p3", "reached"): 1,
+        ("/p3", "lost"): 1,
+    }
     assert len(metrics(exporter, "msgflow_messages_undelivered")) == 2
     assert metrics(exporter, "msgflow_violations") == {
-        ("/p0", "latency"): 1, ("/p3", "latency"): 1,
-    }  # fmt: skip
+        ("/p0", "latency"): 1,
+        ("/p3", "latency"): 1,
+    }
 
 
 def test_another_host_is_refused_and_open_connections_take_no_thread(

@@ -79,10 +79,13 @@ def test_latencies_by_links_that_may_be_others_are_doubted() -> None:
 def test_long_names_leave_the_columns_whole() -> None:
     """In a terminal of 80 columns."""
     thread = {
-        "nodes": "/perception/lidar/points, 3 more", "tid": 123_456, "callback_share": 1.0,
-        "blocked_ns": 312_000_000, "longest_ns": 45_600_000,
+        "nodes": "/perception/lidar/points, 3 more",
+        "tid": 123_456,
+        "callback_share": 1.0,
+        "blocked_ns": 312_000_000,
+        "longest_ns": 45_600_000,
         "longest_callback": "/perception/lidar/points Subscription(/lidar/top/pointcloud)",
-    }  # fmt: skip
+    }
     report = WindowReport(
         window=Window(0, 2_000_000_000),
         paths=(),

@@ -155,9 +155,16 @@ class PerfWriter:
             size = _HEADER.size + sum(map(len, records))
             pages = -(-size // PAGE_BYTES)
             header = _HEADER.pack(
-                _MAGIC, self._identity.uuid.bytes, 0, times[0], times[-1], size * 8,
-                pages * PAGE_BYTES * 8, 0, cpu,
-            )  # fmt: skip
+                _MAGIC,
+                self._identity.uuid.bytes,
+                0,
+                times[0],
+                times[-1],
+                size * 8,
+                pages * PAGE_BYTES * 8,
+                0,
+                cpu,
+            )
             content = b"".join((header, *records))
             (self._directory / f"perf_stream_{cpu}").write_bytes(
                 content.ljust(pages * PAGE_BYTES, b"\0")

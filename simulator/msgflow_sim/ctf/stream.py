@@ -343,10 +343,17 @@ class StreamWriter:
         self._file.write(content)
         self._index.write(
             _INDEX_ENTRY.pack(
-                self._offset, packet_bits, content_bits, begin, end,
-                discarded, _STREAM_ID, self._cpu, sequence,
+                self._offset,
+                packet_bits,
+                content_bits,
+                begin,
+                end,
+                discarded,
+                _STREAM_ID,
+                self._cpu,
+                sequence,
             )
-        )  # fmt: skip
+        )
         self._offset += len(content)
 
     def _overwritten(self, events: Iterable[Entry]) -> None:

@@ -39,12 +39,16 @@ _FILTER = Node(
     publishers=(_publisher("/filtered"), Publisher("/status")),
     subscriptions=(
         Subscription(
-            "/points", ("/filtered",), Work(4 * MILLISECOND, 4 * MILLISECOND, 0.05, 40_000_000),
-            depth=1, group="shared", is_agnocast=True,
+            "/points",
+            ("/filtered",),
+            Work(4 * MILLISECOND, 4 * MILLISECOND, 0.05, 40_000_000),
+            depth=1,
+            group="shared",
+            is_agnocast=True,
         ),
     ),
     timers=(Timer(50 * MILLISECOND, ("/status",)),),
-)  # fmt: skip
+)
 _DETECTOR = Node(
     "detector",
     is_agnocast=True,
@@ -52,13 +56,17 @@ _DETECTOR = Node(
     publishers=(_publisher("/objects", 5), _publisher("/overlay", 5)),
     subscriptions=(
         Subscription(
-            "/filtered", ("/objects",), Work(6 * MILLISECOND, 9 * MILLISECOND), depth=3,
-            group="again", is_agnocast=True,
+            "/filtered",
+            ("/objects",),
+            Work(6 * MILLISECOND, 9 * MILLISECOND),
+            depth=3,
+            group="again",
+            is_agnocast=True,
         ),
         Subscription("/map", depth=1, polled=True, transient_local=True, is_agnocast=True),
     ),
     timers=(Timer(100 * MILLISECOND, does=(Poll("/map"), Publish("/overlay"))),),
-)  # fmt: skip
+)
 _BRIDGE = Node(
     "bridge",
     groups=(Group("shared", executor=1),),
@@ -103,13 +111,17 @@ def agnocast() -> Scenario:
     """Nodes of Agnocast, nodes of rclcpp that use it, and a bridge."""
     short = tuple(
         Process(
-            node.name, "alpha", 2101 + 1000 * life + 100 * number, (replace(node),),
+            node.name,
+            "alpha",
+            2101 + 1000 * life + 100 * number,
+            (replace(node),),
             start_ns=(50 + 900 * life + 30 * number) * MILLISECOND,
-            stop_ns=(700 + 900 * life + 20 * number) * MILLISECOND, executors=_ALONE,
+            stop_ns=(700 + 900 * life + 20 * number) * MILLISECOND,
+            executors=_ALONE,
         )
         for life in range(2)
         for number, node in enumerate(_SHORT)
-    )  # fmt: skip
+    )
     return Scenario(
         name="agnocast",
         description="Messages through the shared memory of Agnocast, a bridge, polls, overwriting.",
@@ -117,24 +129,40 @@ def agnocast() -> Scenario:
         processes=(
             Process("sensor", "alpha", 1101, (_SENSOR,), executors=_ALONE),
             Process(
-                "filter", "alpha", 1201, (_FILTER,), start_ns=5 * MILLISECOND,
+                "filter",
+                "alpha",
+                1201,
+                (_FILTER,),
+                start_ns=5 * MILLISECOND,
                 executors=(Executor(), Executor("agnocast")),
             ),
             Process(
-                "detector", "alpha", 1301, (_DETECTOR,), start_ns=9 * MILLISECOND,
+                "detector",
+                "alpha",
+                1301,
+                (_DETECTOR,),
+                start_ns=9 * MILLISECOND,
                 executors=(Executor("agnocast", thread_count=2),),
             ),
             Process(
-                "agnocast_bridge", "alpha", 1401, (_BRIDGE,), start_ns=12 * MILLISECOND,
+                "agnocast_bridge",
+                "alpha",
+                1401,
+                (_BRIDGE,),
+                start_ns=12 * MILLISECOND,
                 executors=(Executor(), Executor("agnocast")),
             ),
             Process("tracker", "alpha", 1501, (_TRACKER,), start_ns=15 * MILLISECOND),
             Process(
-                "planner", "alpha", 1601, (_PLANNER,), start_ns=1_100 * MILLISECOND,
+                "planner",
+                "alpha",
+                1601,
+                (_PLANNER,),
+                start_ns=1_100 * MILLISECOND,
                 executors=_ALONE,
             ),
             *short,
         ),
         duration_ns=3 * SECOND,
         layout="jazzy-agnocast",
-    )  # fmt: skip
+    )

@@ -35,14 +35,18 @@ def periodic_async() -> Scenario:
             Process("sharing", "alpha", 2001, (_sharing(),), start_ns=70 * MILLISECOND),
             # Inputs that are received while the timer runs, also twice at once.
             Process(
-                "concurrent", "alpha", 2101, (_concurrent(),), start_ns=75 * MILLISECOND,
+                "concurrent",
+                "alpha",
+                2101,
+                (_concurrent(),),
+                start_ns=75 * MILLISECOND,
                 executors=(Executor("multi_threaded", 3),),
             ),
             _sink((*nodes, _sharing(), _concurrent())),
         ),
         duration_ns=4 * SECOND,
         layout="rolling",
-    )  # fmt: skip
+    )
 
 
 def partial_sync() -> Scenario:
@@ -57,18 +61,26 @@ def partial_sync() -> Scenario:
             *_one_each(nodes),
             # Its callbacks run on two threads, one at a time.
             Process(
-                "two_threads", "alpha", 2001, (_both_kinds(),), start_ns=70 * MILLISECOND,
+                "two_threads",
+                "alpha",
+                2001,
+                (_both_kinds(),),
+                start_ns=70 * MILLISECOND,
                 executors=(Executor("multi_threaded", 2),),
             ),
             Process(
-                "spinning", "alpha", 2101, (_spinning(),), start_ns=80 * MILLISECOND,
+                "spinning",
+                "alpha",
+                2101,
+                (_spinning(),),
+                start_ns=80 * MILLISECOND,
                 executors=(Executor(), Executor("nested")),
             ),
             _sink((*nodes, _both_kinds(), _spinning())),
         ),
         duration_ns=4 * SECOND,
         layout="rolling",
-    )  # fmt: skip
+    )
 
 
 def approximate_sync() -> Scenario:
@@ -88,7 +100,10 @@ def approximate_sync() -> Scenario:
             *_sources(tuple(periods_ms.values()), tuple(periods_ms)),
             *(
                 Process(
-                    node.name, "alpha", 1801 + 100 * number, (node,),
+                    node.name,
+                    "alpha",
+                    1801 + 100 * number,
+                    (node,),
                     start_ns=(3 + 5 * number) * MILLISECOND,
                 )
                 for number, node in enumerate(nodes)
@@ -97,7 +112,7 @@ def approximate_sync() -> Scenario:
         ),
         duration_ns=4 * SECOND,
         layout="rolling",
-    )  # fmt: skip
+    )
 
 
 def reentrant() -> Scenario:
@@ -117,8 +132,12 @@ def reentrant() -> Scenario:
             *_sources(_REENTRANT_PERIODS_MS),
             *(
                 Process(
-                    node.name, "alpha", 1501 + 100 * number, (node,),
-                    executors=(Executor("multi_threaded", 4),), start_ns=(3 + 5 * number) * 10**6,
+                    node.name,
+                    "alpha",
+                    1501 + 100 * number,
+                    (node,),
+                    executors=(Executor("multi_threaded", 4),),
+                    start_ns=(3 + 5 * number) * 10**6,
                 )
                 for number, node in enumerate(nodes)
             ),
@@ -126,7 +145,7 @@ def reentrant() -> Scenario:
         ),
         duration_ns=4 * SECOND,
         layout="rolling",
-    )  # fmt: skip
+    )
 
 
 def _spinning() -> Node:
@@ -148,7 +167,9 @@ def _spinning() -> Node:
 def _sources(periods_ms: tuple[int, ...], topics: tuple[str, ...] = _INPUTS) -> tuple[Process, ...]:
     return tuple(
         Process(
-            f"source_{number}", "alpha", 1101 + 100 * number,
+            f"source_{number}",
+            "alpha",
+            1101 + 100 * number,
             (
                 Node(
                     f"source_{number}",
@@ -159,7 +180,7 @@ def _sources(periods_ms: tuple[int, ...], topics: tuple[str, ...] = _INPUTS) -> 
             start_ns=number * 4 * MILLISECOND,
         )
         for number, (topic, period_ms) in enumerate(zip(topics, periods_ms, strict=True))
-    )  # fmt: skip
+    )
 
 
 def _one_each(nodes: tuple[Node, ...]) -> tuple[Process, ...]:

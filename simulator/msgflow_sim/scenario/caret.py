@@ -43,10 +43,15 @@ def caret() -> Scenario:
             Process("planner", "alpha", 1301, (_PLANNER,), start_ns=5 * MILLISECOND),
             Process("clock_recorder", "alpha", 1401, (_CLOCK,), start_ns=7 * MILLISECOND),
             Process(
-                "viewer", "alpha", 1501, (), start_ns=9 * MILLISECOND,
-                executors=(Executor("static_single_threaded"),), readers=("/image", "/map"),
+                "viewer",
+                "alpha",
+                1501,
+                (),
+                start_ns=9 * MILLISECOND,
+                executors=(Executor("static_single_threaded"),),
+                readers=("/image", "/map"),
             ),
         ),
         duration_ns=6 * SECOND,
         layout="humble-fastdds",
-    )  # fmt: skip
+    )

@@ -72,10 +72,14 @@ def channels() -> Scenario:
             Process("viewer", "alpha", 1401, (viewer,), start_ns=7 * MILLISECOND),
             Process("recorder", "beta", 1501, (recorder,), start_ns=9 * MILLISECOND),
             Process(
-                "echo", "beta", 1601, (echo,), start_ns=11 * MILLISECOND,
+                "echo",
+                "beta",
+                1601,
+                (echo,),
+                start_ns=11 * MILLISECOND,
                 executors=(Executor(),),
             ),
         ),
         duration_ns=6 * SECOND,
         overwrites=True,
-    )  # fmt: skip
+    )

@@ -56,13 +56,18 @@ def containers_one_daemon() -> Scenario:
         hosts=(Host("alpha"),),
         processes=tuple(
             Process(
-                name, "alpha", _PID, (node,), start_ns=number * MILLISECOND, executors=executors,
+                name,
+                "alpha",
+                _PID,
+                (node,),
+                start_ns=number * MILLISECOND,
+                executors=executors,
                 container=name,
             )
             for number, (name, node, executors) in enumerate(programs)
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def containers_one_hostname() -> Scenario:
@@ -78,11 +83,14 @@ def containers_one_hostname() -> Scenario:
             Process("relay", "robot_1", 1201, (_relay("/b", "/c"),), start_ns=5 * MILLISECOND),
             Process("sink", "robot_1", 1301, (sink,), start_ns=10 * MILLISECOND),
             Process(
-                "source", "robot_2", 1101, (_source("/e", 8 * MILLISECOND),),
+                "source",
+                "robot_2",
+                1101,
+                (_source("/e", 8 * MILLISECOND),),
                 start_ns=15 * MILLISECOND,
             ),
             Process("relay", "robot_2", 1201, (_relay("/a", "/b"),), start_ns=21 * MILLISECOND),
             Process("sink", "robot_2", 1301, (_relay("/e", "/f"),), start_ns=26 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )

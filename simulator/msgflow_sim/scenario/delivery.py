@@ -76,11 +76,15 @@ def losses() -> Scenario:
         processes=(
             Process("source", "alpha", 1101, (source,)),
             Process(
-                "listener", "alpha", 1201, (listener,), start_ns=3 * MILLISECOND,
+                "listener",
+                "alpha",
+                1201,
+                (listener,),
+                start_ns=3 * MILLISECOND,
                 executors=(Executor(),),
             ),
             Process("busy", "alpha", 1301, (busy,), start_ns=7 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
         overwrites=True,
-    )  # fmt: skip
+    )

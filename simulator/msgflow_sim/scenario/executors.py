@@ -36,13 +36,17 @@ def multi_threaded() -> Scenario:
         processes=(
             Process("source", "alpha", 1101, (_SOURCE,)),
             Process(
-                "worker", "alpha", 1201, (_WORKER,), start_ns=3 * MILLISECOND,
+                "worker",
+                "alpha",
+                1201,
+                (_WORKER,),
+                start_ns=3 * MILLISECOND,
                 executors=(Executor("multi_threaded", 4),),
             ),
             Process("sink", "alpha", 1301, (_SINK,), start_ns=7 * MILLISECOND),
         ),
         duration_ns=4 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def executors() -> Scenario:
@@ -72,7 +76,10 @@ def executors() -> Scenario:
         processes=(
             Process("source", "alpha", 1101, (_SOURCE,)),
             Process(
-                "container", "alpha", 1201, (planner, checker, monitor),
+                "container",
+                "alpha",
+                1201,
+                (planner, checker, monitor),
                 start_ns=3 * MILLISECOND,
                 executors=(
                     Executor(),
@@ -83,7 +90,7 @@ def executors() -> Scenario:
             Process("sink", "alpha", 1301, (_SINK,), start_ns=7 * MILLISECOND),
         ),
         duration_ns=4 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def events_executors() -> Scenario:
@@ -124,17 +131,25 @@ def events_executors() -> Scenario:
         processes=(
             Process("source", "alpha", 1101, (source,)),
             Process(
-                "relay", "alpha", 1201, (relay,), start_ns=3 * MILLISECOND,
+                "relay",
+                "alpha",
+                1201,
+                (relay,),
+                start_ns=3 * MILLISECOND,
                 executors=(Executor("events"),),
             ),
             Process(
-                "worker", "alpha", 1301, (worker,), start_ns=5 * MILLISECOND,
+                "worker",
+                "alpha",
+                1301,
+                (worker,),
+                start_ns=5 * MILLISECOND,
                 executors=(Executor("events"),),
             ),
             Process("sink", "alpha", 1401, (_SINK,), start_ns=7 * MILLISECOND),
         ),
         duration_ns=4 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def busy_waiting() -> Scenario:
@@ -151,17 +166,25 @@ def busy_waiting() -> Scenario:
         processes=(
             Process("source", "alpha", 1101, (_SOURCE,)),
             Process(
-                "crowded", "alpha", 1201, (crowded,), start_ns=3 * MILLISECOND,
+                "crowded",
+                "alpha",
+                1201,
+                (crowded,),
+                start_ns=3 * MILLISECOND,
                 executors=(Executor("multi_threaded", 2, waits_busily=True),),
             ),
             Process(
-                "worker", "alpha", 1301, (_WORKER,), start_ns=5 * MILLISECOND,
+                "worker",
+                "alpha",
+                1301,
+                (_WORKER,),
+                start_ns=5 * MILLISECOND,
                 executors=(Executor("multi_threaded", 4),),
             ),
             Process("sink", "alpha", 1401, (_SINK,), start_ns=7 * MILLISECOND),
         ),
         duration_ns=SECOND,
-    )  # fmt: skip
+    )
 
 
 def polled() -> Scenario:
@@ -184,17 +207,25 @@ def polled() -> Scenario:
         processes=(
             Process("source", "alpha", 1101, (_SOURCE,)),
             Process(
-                "relay", "alpha", 1201, (relay,), start_ns=3 * MILLISECOND,
+                "relay",
+                "alpha",
+                1201,
+                (relay,),
+                start_ns=3 * MILLISECOND,
                 executors=(Executor(polled_ns=15 * MILLISECOND),),
             ),
             Process(
-                "checker", "alpha", 1301, (checker,), start_ns=5 * MILLISECOND,
+                "checker",
+                "alpha",
+                1301,
+                (checker,),
+                start_ns=5 * MILLISECOND,
                 executors=(Executor(timeout_ns=12 * MILLISECOND),),
             ),
             Process("sink", "alpha", 1401, (_SINK,), start_ns=7 * MILLISECOND),
         ),
         duration_ns=2 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def timers() -> Scenario:
@@ -223,4 +254,4 @@ def timers() -> Scenario:
             Process("late", "alpha", 1201, (late,), start_ns=3 * MILLISECOND),
         ),
         duration_ns=5 * SECOND,
-    )  # fmt: skip
+    )

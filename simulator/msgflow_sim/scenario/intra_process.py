@@ -64,12 +64,15 @@ def intra_process() -> Scenario:
         hosts=(Host("alpha"),),
         processes=(
             Process(
-                "container", "alpha", 1101, (_FILTER, _SLOW, _DISPLAY, _CAMERA),
+                "container",
+                "alpha",
+                1101,
+                (_FILTER, _SLOW, _DISPLAY, _CAMERA),
                 executors=(Executor(), Executor()),
             ),
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def mixed_intra_process() -> Scenario:
@@ -102,14 +105,16 @@ def mixed_intra_process() -> Scenario:
         hosts=(Host("alpha"),),
         processes=(
             Process(
-                "container", "alpha", 1101,
+                "container",
+                "alpha",
+                1101,
                 (_FILTER, _DISPLAY, listener, _CAMERA, map_server),
                 executors=(Executor(), Executor("multi_threaded", 2)),
             ),
             Process("recorder", "alpha", 1201, (recorder,), start_ns=3 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def container() -> Scenario:

@@ -36,17 +36,26 @@ def python() -> Scenario:
         processes=(
             Process("talker", "alpha", 1101, (talker,)),
             Process(
-                "python3", "alpha", 1201, (relay,), start_ns=3 * MILLISECOND,
+                "python3",
+                "alpha",
+                1201,
+                (relay,),
+                start_ns=3 * MILLISECOND,
                 client_library="rclpy",
             ),
             Process(
-                "python3", "alpha", 1301, (listener,), start_ns=7 * MILLISECOND,
-                client_library="rclpy", executors=(Executor(timeout_ns=5 * MILLISECOND),),
+                "python3",
+                "alpha",
+                1301,
+                (listener,),
+                start_ns=7 * MILLISECOND,
+                client_library="rclpy",
+                executors=(Executor(timeout_ns=5 * MILLISECOND),),
             ),
             Process("listener", "alpha", 1401, (listener,), start_ns=11 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def python_timers() -> Scenario:
@@ -120,10 +129,15 @@ def python_timers() -> Scenario:
             Process("source", "alpha", 1101, (source,)),
             *(
                 Process(
-                    "python3", "alpha", 1201 + 100 * number, (node,),
-                    start_ns=(3 + 4 * number) * MILLISECOND, client_library="rclpy",
+                    "python3",
+                    "alpha",
+                    1201 + 100 * number,
+                    (node,),
+                    start_ns=(3 + 4 * number) * MILLISECOND,
+                    client_library="rclpy",
                     executors=(
-                        Executor("multi_threaded", 4) if node is threads
+                        Executor("multi_threaded", 4)
+                        if node is threads
                         # Each wait makes a timer.
                         else Executor(timeout_ns=10 * MILLISECOND),
                     ),
@@ -133,7 +147,7 @@ def python_timers() -> Scenario:
             Process("sink", "alpha", 1701, (sink,), start_ns=29 * MILLISECOND),
         ),
         duration_ns=8 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def layers() -> Scenario:
@@ -182,13 +196,17 @@ def layers() -> Scenario:
             Process("source", "alpha", 1101, (source,)),
             Process("sink", "alpha", 1201, (sink, special), start_ns=3 * MILLISECOND),
             Process(
-                "waiting", "alpha", 1301, (waiting,), start_ns=7 * MILLISECOND,
+                "waiting",
+                "alpha",
+                1301,
+                (waiting,),
+                start_ns=7 * MILLISECOND,
                 executors=(Executor("wait_set"),),
             ),
             Process("polling", "alpha", 1401, (polling,), start_ns=11 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def polling() -> Scenario:
@@ -215,12 +233,15 @@ def polling() -> Scenario:
                 20 * MILLISECOND,
                 ("/begun",),
                 does=(
-                    Poll("/first"), Publish("/half"), Poll("/second"), Poll("/second"),
+                    Poll("/first"),
+                    Publish("/half"),
+                    Poll("/second"),
+                    Poll("/second"),
                     Publish("/plan"),
                 ),
             ),
         ),
-    )  # fmt: skip
+    )
     control = Node(
         "control",
         publishers=(Publisher("/command"),),
@@ -245,4 +266,4 @@ def polling() -> Scenario:
             Process("sink", "alpha", 1501, (sink,), start_ns=13 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )

@@ -27,15 +27,16 @@ _SPINNER = Node(
     clients=(Client("/look_up", group="answers"),),
     subscriptions=(
         # Each run spins the executor that it is in, until three of them are nested.
-        Subscription("/input", ("/input_seen",), does=(Spin(1, 4 * MILLISECOND, depth=3),),
-                     group="again"),
+        Subscription(
+            "/input", ("/input_seen",), does=(Spin(1, 4 * MILLISECOND, depth=3),), group="again"
+        ),
     ),
     timers=(
         Timer(20 * MILLISECOND, ("/done",), does=(Spin(1, 6 * MILLISECOND, depth=3),)),
         # Waits in its callback until the service has answered.
         Timer(50 * MILLISECOND, ("/done",), does=(Call("/look_up", spins=2),)),
     ),
-)  # fmt: skip
+)
 
 
 def nested() -> Scenario:
@@ -47,11 +48,17 @@ def nested() -> Scenario:
         processes=(
             Process("source", "alpha", 1101, (_SOURCE,)),
             Process(
-                "spinner", "alpha", 1201, (_SPINNER,), start_ns=3 * MILLISECOND,
+                "spinner",
+                "alpha",
+                1201,
+                (_SPINNER,),
+                start_ns=3 * MILLISECOND,
                 executors=(Executor(), Executor("nested"), Executor("nested")),
             ),
             Process(
-                "sink", "alpha", 1301,
+                "sink",
+                "alpha",
+                1301,
                 (
                     Node(
                         "sink",
@@ -63,4 +70,4 @@ def nested() -> Scenario:
             ),
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )

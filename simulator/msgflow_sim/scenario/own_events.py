@@ -29,17 +29,20 @@ _DETECTOR = Node(
     subscriptions=(
         # Runs nested in itself: which run an event is of shows only what began and ended before.
         Subscription(
-            "/image", ("/seen",), does=(Record(), Spin(1, 14 * MILLISECOND, depth=3), Record()),
+            "/image",
+            ("/seen",),
+            does=(Record(), Spin(1, 14 * MILLISECOND, depth=3), Record()),
             group="again",
         ),
     ),
     timers=(
         Timer(
-            30 * MILLISECOND, ("/detections",),
+            30 * MILLISECOND,
+            ("/detections",),
             does=(Record(), Spin(1, 6 * MILLISECOND, depth=3), Record()),
         ),
     ),
-)  # fmt: skip
+)
 # Without callbacks that are traced: rclpy, and what a client does with its answer.
 _WATCHER = Node(
     "watcher",
@@ -67,11 +70,19 @@ def own_events() -> Scenario:
         processes=(
             Process("camera", "alpha", 1101, (_CAMERA,)),
             Process(
-                "detector", "alpha", 1201, (_DETECTOR,), start_ns=3 * MILLISECOND,
+                "detector",
+                "alpha",
+                1201,
+                (_DETECTOR,),
+                start_ns=3 * MILLISECOND,
                 executors=(Executor(), Executor("nested")),
             ),
             Process(
-                "watcher", "alpha", 1301, (_WATCHER,), start_ns=7 * MILLISECOND,
+                "watcher",
+                "alpha",
+                1301,
+                (_WATCHER,),
+                start_ns=7 * MILLISECOND,
                 client_library="rclpy",
             ),
             Process("asker", "alpha", 1401, (_ASKER,), start_ns=9 * MILLISECOND),
@@ -79,4 +90,4 @@ def own_events() -> Scenario:
         ),
         duration_ns=3 * SECOND,
         layout="kilted",
-    )  # fmt: skip
+    )

@@ -47,10 +47,14 @@ def rivals() -> Scenario:
             Process("rear", "alpha", 1201, (cameras[1],), start_ns=3 * MILLISECOND),
             Process("source", "alpha", 1301, (source,), start_ns=5 * MILLISECOND),
             Process(
-                "shared", "alpha", 1401, (shared,), start_ns=7 * MILLISECOND,
+                "shared",
+                "alpha",
+                1401,
+                (shared,),
+                start_ns=7 * MILLISECOND,
                 executors=(Executor("multi_threaded", 4),),
             ),
             Process("sink", "alpha", 1501, (sink,), start_ns=11 * MILLISECOND),
         ),
         duration_ns=6 * SECOND,
-    )  # fmt: skip
+    )

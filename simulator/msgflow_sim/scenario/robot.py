@@ -82,13 +82,21 @@ def _perception() -> tuple[Process, ...]:
         ),
     )
     ground_filter = _relay(
-        "ground_filter", "/lidar/points", "/perception/obstacles",
-        Work(18 * MILLISECOND, 9 * MILLISECOND), "sensor_msgs::msg::PointCloud2", depths=(5, 5),
-    )  # fmt: skip
+        "ground_filter",
+        "/lidar/points",
+        "/perception/obstacles",
+        Work(18 * MILLISECOND, 9 * MILLISECOND),
+        "sensor_msgs::msg::PointCloud2",
+        depths=(5, 5),
+    )
     tracker = _relay(
-        "tracker", "/perception/detections", "/perception/objects",
-        Work(2 * MILLISECOND, 2 * MILLISECOND), "vision_msgs::msg::Detection3DArray", logs=True,
-    )  # fmt: skip
+        "tracker",
+        "/perception/detections",
+        "/perception/objects",
+        Work(2 * MILLISECOND, 2 * MILLISECOND),
+        "vision_msgs::msg::Detection3DArray",
+        logs=True,
+    )
     return (
         Process("detector", _COMPUTER, 812, (detector,), start_ns=6 * MILLISECOND),
         Process("ground_filter", _COMPUTER, 843, (ground_filter,), start_ns=11 * MILLISECOND),
@@ -118,9 +126,13 @@ def _control() -> tuple[Process, ...]:
         ),
     )
     estimator = _relay(
-        "state_estimator", "/imu/data", "/localization/odometry",
-        Work(250 * MICROSECOND, 150 * MICROSECOND), "sensor_msgs::msg::Imu", depths=(50, 10),
-    )  # fmt: skip
+        "state_estimator",
+        "/imu/data",
+        "/localization/odometry",
+        Work(250 * MICROSECOND, 150 * MICROSECOND),
+        "sensor_msgs::msg::Imu",
+        depths=(50, 10),
+    )
     controller = Node(
         "controller",
         "/control",
@@ -153,9 +165,15 @@ def _control() -> tuple[Process, ...]:
 
 
 def _relay(
-    name: str, heard: str, said: str, work: Work, message_type: str,
-    *, depths: tuple[int, int] = (10, 10), logs: bool = False,
-) -> Node:  # fmt: skip
+    name: str,
+    heard: str,
+    said: str,
+    work: Work,
+    message_type: str,
+    *,
+    depths: tuple[int, int] = (10, 10),
+    logs: bool = False,
+) -> Node:
     """Return a node that answers each message with one, in the namespace of what it publishes."""
     subscription = Subscription(
         heard, (said,), work, depth=depths[0], message_type=message_type, logs=logs

@@ -108,19 +108,31 @@ def rtabmap() -> Scenario:
         processes=(
             Process("realsense2_camera_node", _ROBOT, 1301, (camera,)),
             Process(
-                "rgbd_odometry", _ROBOT, 1348, (listener(0x55D01C40), odometry),
-                start_ns=10 * MILLISECOND, executors=_BOTH,
+                "rgbd_odometry",
+                _ROBOT,
+                1348,
+                (listener(0x55D01C40), odometry),
+                start_ns=10 * MILLISECOND,
+                executors=_BOTH,
             ),
             Process(
-                "rtabmap", _LAPTOP, 194363, (heard_by_slam, slam),
-                start_ns=5 * MILLISECOND, executors=_BOTH,
+                "rtabmap",
+                _LAPTOP,
+                194363,
+                (heard_by_slam, slam),
+                start_ns=5 * MILLISECOND,
+                executors=_BOTH,
             ),
             Process(
-                "rviz2", _LAPTOP, 194375, (listener(0x5581E3D2), rviz),
-                start_ns=15 * MILLISECOND, executors=_BOTH,
+                "rviz2",
+                _LAPTOP,
+                194375,
+                (listener(0x5581E3D2), rviz),
+                start_ns=15 * MILLISECOND,
+                executors=_BOTH,
             ),
         ),
         duration_ns=20 * SECOND,
         layout="rolling",
         overwrites=True,
-    )  # fmt: skip
+    )

@@ -30,16 +30,22 @@ _PLANNER = Node(
     publishers=(Publisher("/cmd"),),
     subscriptions=(
         Subscription(
-            "/objects", ("/cmd",),
+            "/objects",
+            ("/cmd",),
             Work(MILLISECOND, MILLISECOND, sleep_ns=400 * MICROSECOND),
         ),
     ),
-)  # fmt: skip
+)
 _MOTORS = Node("motors", subscriptions=(Subscription("/cmd"),))
 _HOG = Load(
-    "log_compressor", 7001, period_ns=450 * MILLISECOND, busy_ns=60 * MILLISECOND, priority=79,
-    cpus=(0,), start_ns=100 * MILLISECOND,
-)  # fmt: skip
+    "log_compressor",
+    7001,
+    period_ns=450 * MILLISECOND,
+    busy_ns=60 * MILLISECOND,
+    priority=79,
+    cpus=(0,),
+    start_ns=100 * MILLISECOND,
+)
 _BACKUP = Load("backup", 7101, period_ns=70 * MILLISECOND, busy_ns=11 * MILLISECOND)
 
 
@@ -80,15 +86,17 @@ def real_time() -> Scenario:
             Process("recorder", "robot", 1201, (recorder,), start_ns=3 * MILLISECOND),
             # Nothing lets itself be interrupted while it starts.
             Process(
-                "controller", "robot", 1301, (controller,),
-                start_ns=100 * MILLISECOND, priority=40,
+                "controller",
+                "robot",
+                1301,
+                (controller,),
+                start_ns=100 * MILLISECOND,
+                priority=40,
             ),
-            Process(
-                "joints", "robot", 1401, (joints,), start_ns=103 * MILLISECOND, priority=60
-            ),
+            Process("joints", "robot", 1401, (joints,), start_ns=103 * MILLISECOND, priority=60),
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def shared_map() -> Scenario:
@@ -122,13 +130,17 @@ def shared_map() -> Scenario:
         processes=(
             Process("lidar", "robot", 1101, (lidar,)),
             Process(
-                "slam", "robot", 1201, (mapper, localizer), start_ns=3 * MILLISECOND,
+                "slam",
+                "robot",
+                1201,
+                (mapper, localizer),
+                start_ns=3 * MILLISECOND,
                 executors=(Executor(), Executor()),
             ),
             Process("control", "robot", 1301, (control,), start_ns=5 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def shared_memory() -> Scenario:
@@ -193,14 +205,19 @@ def shared_memory() -> Scenario:
         processes=(
             Process("driver", "robot", 1101, (driver,)),
             Process(
-                "perception", "robot", 1201, (detector, tracker), start_ns=3 * MILLISECOND,
-                executors=(Executor(), Executor()), cpus=(0,),
+                "perception",
+                "robot",
+                1201,
+                (detector, tracker),
+                start_ns=3 * MILLISECOND,
+                executors=(Executor(), Executor()),
+                cpus=(0,),
             ),
             Process("planner", "robot", 1301, (planner,), start_ns=5 * MILLISECOND, cpus=(0,)),
             Process("display", "robot", 1401, (display,), start_ns=7 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )
 
 
 def kernel_losses() -> Scenario:

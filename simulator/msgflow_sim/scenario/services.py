@@ -75,7 +75,7 @@ def calls() -> Scenario:
         ),
         duration_ns=2 * SECOND,
         layout="rolling",
-    )  # fmt: skip
+    )
 
 
 def services() -> Scenario:
@@ -117,10 +117,14 @@ def services() -> Scenario:
             Process("server", "beta", 1101, (server,)),
             Process("driver", "alpha", 1201, (driver,), start_ns=3 * MILLISECOND),
             Process(
-                "planner", "alpha", 1301, (planner,), start_ns=60 * MILLISECOND,
+                "planner",
+                "alpha",
+                1301,
+                (planner,),
+                start_ns=60 * MILLISECOND,
                 executors=(Executor(), Executor("nested")),
             ),
         ),
         duration_ns=3 * SECOND,
         layout="rolling",
-    )  # fmt: skip
+    )

@@ -31,7 +31,10 @@ def starved() -> Scenario:
             Process("source", "alpha", 1101, (source,)),
             *(
                 Process(
-                    node.name, "alpha", 1201 + 100 * number, (node,),
+                    node.name,
+                    "alpha",
+                    1201 + 100 * number,
+                    (node,),
                     start_ns=(3 + number) * MILLISECOND,
                     starved_ns=((170 + 30 * number) * MILLISECOND, 40 * MILLISECOND),
                 )
@@ -40,7 +43,7 @@ def starved() -> Scenario:
         ),
         duration_ns=10 * SECOND,
         overwrites=True,
-    )  # fmt: skip
+    )
 
 
 def overwritten_copies() -> Scenario:
@@ -64,10 +67,13 @@ def overwritten_copies() -> Scenario:
         hosts=(Host("alpha"),),
         processes=(
             Process(
-                "container", "alpha", 1101, (slow, camera),
+                "container",
+                "alpha",
+                1101,
+                (slow, camera),
                 executors=(Executor(), Executor()),
             ),
             Process("recorder", "alpha", 1201, (recorder,), start_ns=3 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )

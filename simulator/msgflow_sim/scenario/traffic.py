@@ -46,13 +46,16 @@ def traffic(kind: str, duration_ns: int = 3 * SECOND) -> Scenario:
             _sender("there", "alpha", 1101, *there),
             _receiver("there", "beta", 1201),
             _sender(
-                "back", "beta", 1301, *back,
+                "back",
+                "beta",
+                1301,
+                *back,
                 stop_ns=_SILENT_FROM if kind == "one_way_late" else None,
             ),
             _receiver("back", "alpha", 1401),
         ),
         duration_ns=duration_ns,
-    )  # fmt: skip
+    )
 
 
 def host_chain() -> Scenario:

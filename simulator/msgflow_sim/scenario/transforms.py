@@ -53,14 +53,22 @@ def transforms() -> Scenario:
         processes=(
             Process("state_publisher", "alpha", 1101, (state_publisher,)),
             Process(
-                "odometry", "alpha", 1201, (odometry, listener(0x5581E3D2)),
-                start_ns=3 * MILLISECOND, executors=both,
+                "odometry",
+                "alpha",
+                1201,
+                (odometry, listener(0x5581E3D2)),
+                start_ns=3 * MILLISECOND,
+                executors=both,
             ),
             Process(
-                "localisation", "alpha", 1301, (localisation, listener(0x55D01C40)),
-                start_ns=7 * MILLISECOND, executors=both,
+                "localisation",
+                "alpha",
+                1301,
+                (localisation, listener(0x55D01C40)),
+                start_ns=7 * MILLISECOND,
+                executors=both,
             ),
             Process("sink", "alpha", 1401, (sink,), start_ns=11 * MILLISECOND),
         ),
         duration_ns=3 * SECOND,
-    )  # fmt: skip
+    )

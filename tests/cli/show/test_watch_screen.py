@@ -69,8 +69,14 @@ def test_what_is_worst_comes_first() -> None:
     order = [line.split()[0] for line in found if line.startswith(("/a", "/c"))]
     assert order == ["/c", "/a"]
     assert next(line for line in found if line.startswith("/a")).split()[3:10] == [
-        "10", "40", "ms", "80", "ms", "80", "ms"
-    ]  # fmt: skip
+        "10",
+        "40",
+        "ms",
+        "80",
+        "ms",
+        "80",
+        "ms",
+    ]
     assert any(line.split()[:3] == ["/detector", "77", "50"] for line in found)
 
 
@@ -94,10 +100,16 @@ def test_it_fits_80_columns(length: int) -> None:
 
 def test_a_violation_stays_on_the_screen() -> None:
     violation = {
-        "subject": "/cmd", "path": None, "metric": "latency", "condition": "max < 80 ms",
-        "measured": "182.000 ms", "worst_ns": 182 * MS, "is_final": False,
-        "culprit": "/detector ran 141.000 ms", "why": None,
-    }  # fmt: skip
+        "subject": "/cmd",
+        "path": None,
+        "metric": "latency",
+        "condition": "max < 80 ms",
+        "measured": "182.000 ms",
+        "worst_ns": 182 * MS,
+        "is_final": False,
+        "culprit": "/detector ran 141.000 ms",
+        "why": None,
+    }
     screen = new_screen()
     lines(screen, report(violations=[violation]))
     text = " ".join(lines(screen, report()))
@@ -141,12 +153,16 @@ def test_a_path_that_is_picked_is_seen_with_its_fates() -> None:
 
 
 VIOLATION = {
-    "subject": "/scan → /cmd", "path": "/source → /scan → /filter → /cmd → /sink",
-    "metric": "latency", "condition": "max < 80 ms", "measured": "182.000 ms",
-    "worst_ns": 182 * MS, "is_final": False,
+    "subject": "/scan → /cmd",
+    "path": "/source → /scan → /filter → /cmd → /sink",
+    "metric": "latency",
+    "condition": "max < 80 ms",
+    "measured": "182.000 ms",
+    "worst_ns": 182 * MS,
+    "is_final": False,
     "culprit": "/filter ran 141.000 ms, /scan was on its way for 40.762 ms",
     "why": "/filter: its callback Subscription(/scan) takes 139 ms of 180 ms",
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("width", [80, 100])
