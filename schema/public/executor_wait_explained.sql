@@ -49,11 +49,11 @@ arrived AS (
 ),
 ready AS MATERIALIZED (
     SELECT
-        r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.since,
-        r.origin_ns, coalesce(a.arrived_ns, r.earliest_ns) AS earliest_ns,
-        coalesce(a.arrived_ns, r.latest_ns) AS latest_ns, r.start_ns, r.thread_count, r.picked_ns,
-        r.wait_start_ns, r.wait_end_ns, r.wait_before_ns, r.previous_wait_end_ns,
-        r.is_loss_affected, a.until_arrival_ns
+        r.* REPLACE (
+            coalesce(a.arrived_ns, r.earliest_ns) AS earliest_ns,
+            coalesce(a.arrived_ns, r.latest_ns) AS latest_ns
+        ),
+        a.until_arrival_ns
     FROM query_table(waits) AS r
     LEFT JOIN arrived AS a ON r.callback_instance_id = a.callback_instance_id
 ),
