@@ -190,18 +190,14 @@ folded AS (
     SELECT
         run_id, flow_rank, min(position) AS position, min(at_ns) AS at_ns,
         sum(duration_ns)::BIGINT AS duration_ns, hop,
-        CASE WHEN is_layer THEN 'publish' ELSE any_value(part) END AS part,
-        CASE WHEN is_layer THEN 'publish' ELSE any_value(activity) END AS activity,
+        CASE WHEN is_layer THEN 'publish' ELSE part END AS part,
+        CASE WHEN is_layer THEN 'publish' ELSE activity END AS activity,
         node, what, is_certain, min(from_ns) AS from_ns, callback_instance_id, publication_id,
-        take_id, latency_ns, path_id, state, who, thread, wakers, priority, who_priority,
+        take_id, latency_ns, path_id, state, who, thread, wakers, priority, who_priority, is_layer,
+        CASE WHEN NOT is_layer AND ($detail = 'full' OR state IS NULL) THEN position END AS alone,
         count(*) FILTER (WHERE NOT is_layer) AS pieces
     FROM piece
-    GROUP BY
-        run_id, flow_rank, hop, node, what, is_certain, callback_instance_id, publication_id,
-        take_id, latency_ns, path_id, state, who, thread, wakers, priority, who_priority, is_layer,
-        CASE WHEN NOT is_layer THEN part END,
-        CASE WHEN NOT is_layer THEN activity END,
-        CASE WHEN NOT is_layer AND ($detail = 'full' OR state IS NULL) THEN position END
+    GROUP BY ALL
 ),
 sorted AS (
     SELECT

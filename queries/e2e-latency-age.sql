@@ -4,7 +4,7 @@
 --     until the next output. Their age right before that is the highest that they reach: the peak
 --     age. The time window applies to outputs.
 -- grain: one row per path
--- reads: path_chain
+-- reads: path_chain, named_path
 -- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: outputs BIGINT           Outputs in the time window
@@ -66,6 +66,6 @@ SELECT
     m.peaks[1] AS peak_median_ns,
     m.peaks[2] AS peak_p95_ns,
     m.peak_max_ns, m.time_mean_ns, m.sink_event, p.is_cut, p.path
-FROM main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p
+FROM named_path AS p
 LEFT JOIN measured AS m ON p.path_id = m.path_id
 ORDER BY p.run_id, p.path, p.path_id

@@ -6,7 +6,7 @@
 --     an input is lost, the reaction waits for an output of a later one. The time window applies to
 --     the later input.
 -- grain: one row per path
--- reads: path_chain, every_outcome
+-- reads: every_outcome, named_path
 -- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: inputs BIGINT            Inputs in the time window
@@ -80,6 +80,6 @@ SELECT
     p.run_id,
     coalesce(COLUMNS(['inputs', 'intervals', 'unanswered', 'loss_affected', 'ambiguous']), 0),
     unnest(m.reaction), m.event_mean_ns, m.sink_event, p.is_cut, p.path
-FROM main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p
+FROM named_path AS p
 LEFT JOIN measured AS m ON p.path_id = m.path_id
 ORDER BY p.run_id, p.path, p.path_id

@@ -7,7 +7,7 @@
 --     newest input of the cycle. CARET measures with --from-event publish --to-event
 --     callback_start.
 -- grain: one row per path and response time
--- reads: path_chain, answered_input
+-- reads: answered_input, named_path
 -- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: response VARCHAR         'all', 'best', 'worst' or 'worst-with-external-latency'
@@ -66,6 +66,6 @@ measured AS (
 )
 SELECT
     p.run_id, m.response, m.count, m.ambiguous, unnest(m.spread), m.sink_event, p.is_cut, p.path
-FROM main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p
+FROM named_path AS p
 JOIN measured AS m ON p.path_id = m.path_id
 ORDER BY p.run_id, p.path, p.path_id, m.response

@@ -18,18 +18,18 @@
 --     client_count, action_server_count, action_client_count, pid
 SELECT
     n.run_id, n.full_name AS node, p.name AS process_name, p.pid,
-    (SELECT count(*) FROM main.publisher AS o WHERE o.node_id = n.node_id AND NOT o.is_internal)
+    (SELECT count(*) FROM main.publisher WHERE node_id = n.node_id AND NOT is_internal)
         AS publisher_count,
-    (SELECT count(*) FROM main.subscription AS o WHERE o.node_id = n.node_id AND NOT o.is_internal)
+    (SELECT count(*) FROM main.subscription WHERE node_id = n.node_id AND NOT is_internal)
         AS subscription_count,
-    (SELECT count(*) FROM main.timer AS o WHERE o.node_id = n.node_id) AS timer_count,
-    (SELECT count(*) FROM main.service AS o WHERE o.node_id = n.node_id AND NOT o.is_internal)
+    (SELECT count(*) FROM main.timer WHERE node_id = n.node_id) AS timer_count,
+    (SELECT count(*) FROM main.service WHERE node_id = n.node_id AND NOT is_internal)
         AS service_count,
-    (SELECT count(*) FROM main.client AS o WHERE o.node_id = n.node_id AND NOT o.is_internal)
+    (SELECT count(*) FROM main.client WHERE node_id = n.node_id AND NOT is_internal)
         AS client_count,
-    (SELECT count(*) FROM main.action_server AS o WHERE o.node_id = n.node_id)
+    (SELECT count(*) FROM main.action_server WHERE node_id = n.node_id)
         AS action_server_count,
-    (SELECT count(*) FROM main.action_client AS o WHERE o.node_id = n.node_id)
+    (SELECT count(*) FROM main.action_client WHERE node_id = n.node_id)
         AS action_client_count
 FROM main.node AS n
 JOIN main.process AS p ON n.process_id = p.process_id

@@ -44,15 +44,15 @@ object AS (
 by_process AS (
     SELECT
         process_id, 'open_callbacks' AS measure,
-        sum((end_ns IS NULL)::BIGINT)::BIGINT AS affected, count(*) AS total
+        count_if(end_ns IS NULL) AS affected, count(*) AS total
     FROM main.callback_instance
     GROUP BY process_id
     UNION ALL
-    SELECT process_id, 'loss_affected_callbacks', sum(is_loss_affected::BIGINT)::BIGINT, count(*)
+    SELECT process_id, 'loss_affected_callbacks', count_if(is_loss_affected), count(*)
     FROM main.callback_instance
     GROUP BY process_id
     UNION ALL
-    SELECT process_id, 'placeholders', sum(is_inferred::BIGINT)::BIGINT, count(*)
+    SELECT process_id, 'placeholders', count_if(is_inferred), count(*)
     FROM object
     GROUP BY process_id
 ),
@@ -67,35 +67,30 @@ by_topic AS (
     UNION ALL
     SELECT
         d.run_id, s.topic_name, 'unknown_deliveries',
-        sum((d.status = 'unknown')::BIGINT)::BIGINT, count(*), bool_or(s.is_internal)
+        count_if(d.status = 'unknown'), count(*), bool_or(s.is_internal)
     FROM main.stat_delivery AS d
     JOIN main.subscription AS s ON d.subscription_id = s.subscription_id
     GROUP BY d.run_id, s.topic_name
 ),
 by_run AS (
     SELECT run_id, 'loss_affected_transport_links' AS measure,
-        sum(is_loss_affected::BIGINT)::BIGINT AS affected, count(*) AS total
+        count_if(is_loss_affected) AS affected, count(*) AS total
     FROM main.link_transport
     GROUP BY run_id
     UNION ALL
     SELECT
         run_id, 'ambiguous_transport_links',
-        sum(coalesce(candidate_count > 1, false)::BIGINT)::BIGINT, count(*)
+        count_if(coalesce(candidate_count > 1, false)), count(*)
     FROM main.link_transport
     GROUP BY run_id
     UNION ALL
-    SELECT run_id, 'loss_affected_causal_links', sum(is_loss_affected::BIGINT)::BIGINT, count(*)
+    SELECT run_id, 'loss_affected_causal_links', count_if(is_loss_affected), count(*)
     FROM main.link_causal
     GROUP BY run_id
     UNION ALL
-    SELECT t.run_id, 'orphan_takes', count(o.take_id), count(*)
-    FROM main.take AS t
-    LEFT JOIN main.stat_orphan AS o ON t.take_id = o.take_id
-    GROUP BY t.run_id
-    UNION ALL
-    SELECT run_id, 'unknown_deliveries', sum((status = 'unknown')::BIGINT)::BIGINT, count(*)
-    FROM main.stat_delivery
-    GROUP BY run_id
+    SELECT run_id, measure, sum(affected), sum(total)
+    FROM by_topic
+    GROUP BY run_id, measure
 ),
 measured AS (
     SELECT
@@ -129,7 +124,9 @@ measured AS (
     JOIN main.run AS r ON b.run_id = r.run_id
 )
 SELECT
-    run_id, scope, subject, measure, affected, total,
+    run_id, scope, subject, measure,
+    affected::BIGINT AS affected,
+    total::BIGINT AS total,
     100 * affected / nullif(total, 0) AS affected_percent,
     is_internal
 FROM measured

@@ -114,8 +114,7 @@ firing AS (
 ),
 firing_input AS (
     SELECT
-        f.publisher_id, f.output_topic, f.node_id, f.callback_instance_id, f.published_ns,
-        f.emptied_ns, i.subscription_id,
+        f.* REPLACE (i.subscription_id AS subscription_id),
         f.subscription_id = i.subscription_id AS is_own
     FROM firing AS f
     JOIN input AS i ON f.node_id = i.node_id
@@ -334,8 +333,10 @@ independent AS (
 -- It may keep the messages for what it publishes by itself.
 kept_by_hand AS (
     SELECT
-        node_id, 'periodic_async' AS kind, inputs, outputs, evidence,
-        'only if the node keeps these messages for what it publishes by itself' AS doubt
+        * REPLACE (
+            'periodic_async' AS kind,
+            'only if the node keeps these messages for what it publishes by itself' AS doubt
+        )
     FROM independent
 ),
 received AS (

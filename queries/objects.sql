@@ -20,7 +20,6 @@
 -- column: is_internal
 -- brief: kind, name, node, process, pid, host, queue_depth, goals, created_ns, symbols
 WITH nameless_timer AS (
-    SELECT t.run_id, t.process_id, t.timer_id, t.created_ns
     FROM main.timer AS t
     ANTI JOIN main.callback AS c ON t.timer_id = c.timer_id
     WHERE t.node_id IS NULL

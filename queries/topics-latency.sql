@@ -33,11 +33,8 @@ WITH received AS (
     FROM main.take AS t
     LEFT JOIN main.link_transport AS l ON t.take_id = l.take_id
     LEFT JOIN main.callback_instance AS i ON t.take_id = i.take_id
-    LEFT JOIN (
-        SELECT callback_instance_id, busy_min_ns, busy_max_ns
-        FROM main.executor_wait
-        WHERE list_contains($runs, run_id)
-    ) AS w ON i.callback_instance_id = w.callback_instance_id
+    LEFT JOIN (FROM main.executor_wait WHERE list_contains($runs, run_id)) AS w
+        ON i.callback_instance_id = w.callback_instance_id
     WHERE list_contains($runs, t.run_id)
         AND t.taken_ns >= $start_ns
         AND t.taken_ns < $end_ns

@@ -66,9 +66,9 @@ WITH path_chain AS MATERIALIZED (
 ),
 flow AS (
     SELECT
-        e.run_id, p.path, p.topics[1] AS first_topic, p.topics[-1] AS last_topic, e.root_kind,
-        e.root_id, e.root_ns, e.take_id, e.sink_ns, e.latency_ns, e.status, e.is_first, e.is_last,
-        e.is_newest, e.is_loss_affected, e.is_ambiguous, p.is_cut
+        e.*, p.path, p.is_cut,
+        p.topics[1] AS first_topic,
+        p.topics[-1] AS last_topic
     FROM main.end_to_end(
         [run_a, run_b], from_topic, to_topic, 'callback_start', 'callback_end',
         (-9223372036854775808)::BIGINT, 9223372036854775807, chains := 'path_chain'
@@ -77,16 +77,12 @@ flow AS (
     WHERE what IN ('paths', 'ends')
 ),
 outcome AS (
+    SELECT *, path AS subject FROM flow WHERE what IS NOT DISTINCT FROM 'paths'
+    UNION ALL BY NAME
     SELECT
-        run_id, path AS subject, root_ns, root_id, latency_ns, status, is_first, is_last,
-        is_newest, is_loss_affected, is_ambiguous, is_cut
-    FROM flow
-    WHERE what IS NOT DISTINCT FROM 'paths'
-    UNION ALL
-    SELECT
-        run_id, concat_ws(' → ', coalesce(first_topic, '?'), coalesce(last_topic, '?'), node),
-        root_ns, root_id, latency_ns, status, is_first, is_last, is_newest, is_loss_affected,
-        is_ambiguous, (SELECT bool_or(is_cut) FROM flow)
+        *,
+        concat_ws(' → ', coalesce(first_topic, '?'), coalesce(last_topic, '?'), node) AS subject,
+        (SELECT bool_or(is_cut) FROM flow) AS is_cut
     FROM main.end_to_end_between('flow')
     WHERE what IS NOT DISTINCT FROM 'ends'
 ),
@@ -107,27 +103,20 @@ thing AS (
     FROM outcome
     UNION ALL
     SELECT
-        i.run_id,
-        l.node || ' · ' || l.label AS subject,
-        l.is_internal, i.start_ns AS at_ns, i.callback_instance_id AS id,
-        i.end_ns - i.start_ns AS value_ns,
-        true AS is_unit,
-        i.end_ns IS NOT NULL AS is_complete,
-        i.is_loss_affected, false AS is_ambiguous, false AS is_cut
+        i.run_id, l.node || ' · ' || l.label, l.is_internal, i.start_ns, i.callback_instance_id,
+        i.end_ns - i.start_ns, true, i.end_ns IS NOT NULL, i.is_loss_affected, false, false
     FROM main.callback_instance AS i
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
     WHERE what IS NOT DISTINCT FROM 'callbacks' AND list_contains([run_a, run_b], i.run_id)
     UNION ALL
     SELECT
         t.run_id,
-        coalesce(s.topic_name, '?') || ' → ' || main.node_label(n.full_name, p.name, p.pid)
-            AS subject,
-        coalesce(s.is_internal, false) AS is_internal,
-        t.taken_ns AS at_ns, t.take_id AS id, l.latency_ns AS value_ns, true AS is_unit,
-        l.take_id IS NOT NULL AS is_complete,
-        t.is_loss_affected OR coalesce(l.is_loss_affected, false) AS is_loss_affected,
-        l.candidate_count > 1 AS is_ambiguous,
-        false AS is_cut
+        coalesce(s.topic_name, '?') || ' → ' || main.node_label(n.full_name, p.name, p.pid),
+        coalesce(s.is_internal, false), t.taken_ns, t.take_id, l.latency_ns, true,
+        l.take_id IS NOT NULL,
+        t.is_loss_affected OR coalesce(l.is_loss_affected, false),
+        l.candidate_count > 1,
+        false
     FROM main.take AS t
     LEFT JOIN main.link_transport AS l ON t.take_id = l.take_id
     LEFT JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
@@ -219,8 +208,8 @@ paired AS (
         a.ambiguous AS a_ambiguous, b.ambiguous AS b_ambiguous, a.warm_up_ns AS a_warm_up_ns,
         b.warm_up_ns AS b_warm_up_ns,
         coalesce(a.is_cut, false) OR coalesce(b.is_cut, false) AS is_cut
-    FROM (SELECT * FROM value WHERE side = 'a') AS a
-    FULL JOIN (SELECT * FROM value WHERE side = 'b') AS b
+    FROM (FROM value WHERE side = 'a') AS a
+    FULL JOIN (FROM value WHERE side = 'b') AS b
         ON a.subject = b.subject AND a.statistic = b.statistic
 ),
 judged AS (
@@ -253,7 +242,7 @@ SELECT
     CASE WHEN reason IS NULL THEN high_ns END AS high_ns,
     CASE
         WHEN reason IS NOT NULL THEN reason
-        WHEN low_ns <= 0 AND high_ns >= 0 THEN 'no difference shown'
+        WHEN 0 BETWEEN low_ns AND high_ns THEN 'no difference shown'
         WHEN abs(b_ns - a_ns) < at_least * abs(a_ns) THEN 'about equal'
         WHEN low_ns > 0 THEN 'B is longer'
         ELSE 'B is shorter'

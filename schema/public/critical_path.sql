@@ -31,9 +31,4 @@ WITH flow_part AS MATERIALIZED (
         most_flows := most_flows, at_quantile := at_quantile, path_ids := path_ids
     )
 )
-SELECT
-    run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
-    activity, from_ns, to_ns, duration_ns, is_certain, callback_instance_id, publication_id,
-    state, wakers, state_thread_id, priority, by_kind, by_thread_id, by_other_thread_id,
-    by_priority, request_id
 FROM main.critical_piece('flow_part', runs)

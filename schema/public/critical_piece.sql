@@ -49,8 +49,7 @@ waited_call AS MATERIALIZED (
 call AS (
     SELECT
         g.position, g.part, g.callback_instance_id, NULL::BIGINT AS outer_id,
-        w.request_id, w.server_instance_id, w.sent_ns, w.taken_ns, w.start_ns, w.answered_ns,
-        w.returned_ns
+        w.* EXCLUDE (callback_instance_id)
     FROM given AS g
     JOIN waited_call AS w ON g.callback_instance_id = w.callback_instance_id
     WHERE g.part IN ('callback', 'service')
@@ -59,8 +58,7 @@ call AS (
     UNION ALL
     SELECT
         c.position, 'service', c.server_instance_id, c.request_id,
-        w.request_id, w.server_instance_id, w.sent_ns, w.taken_ns, w.start_ns, w.answered_ns,
-        w.returned_ns
+        w.* EXCLUDE (callback_instance_id)
     FROM call AS c
     JOIN waited_call AS w ON c.server_instance_id = w.callback_instance_id
     WHERE w.sent_ns >= c.start_ns AND w.returned_ns <= c.answered_ns
@@ -103,7 +101,6 @@ part AS MATERIALIZED (
     WINDOW in_time AS (PARTITION BY m.position ORDER BY m.at_ns, m.sent_ns NULLS FIRST, m.place)
 ),
 waiting AS MATERIALIZED (
-    SELECT position, part, from_ns, to_ns, callback_instance_id, publication_id
     FROM part
     WHERE part IN ('publish_to_take', 'request_to_take', 'take_to_callback', 'cache')
         AND callback_instance_id IS NOT NULL
@@ -325,19 +322,20 @@ candidate AS (
 ),
 named AS (
     SELECT
-        p.run_id, p.path_id, p.root_kind, p.root_id, p.take_id, p.latency_ns, p.flow_rank, p.hop,
-        p.part, p.position, p.request_id, c.from_ns, c.to_ns,
+        p.* REPLACE (
+            c.from_ns AS from_ns, c.to_ns AS to_ns,
+            CASE WHEN c.activity IS NULL THEN p.callback_instance_id ELSE c.callback_instance_id
+                END AS callback_instance_id,
+            CASE WHEN c.activity IS NULL THEN p.publication_id ELSE c.publication_id END
+                AS publication_id
+        ),
         CASE
             WHEN c.activity IS NOT NULL THEN c.activity
             WHEN p.part NOT IN ('publish_to_take', 'request_to_take') THEN p.part
             WHEN p.callback_instance_id IS NULL AND p.to_ns > p.from_ns THEN 'undecided'
             ELSE 'network_or_idle'
         END AS activity,
-        CASE WHEN c.priority <= 3 THEN coalesce(c.from_ns >= c.latest_ns, false) END AS is_certain,
-        CASE WHEN c.activity IS NULL THEN p.callback_instance_id ELSE c.callback_instance_id END
-            AS callback_instance_id,
-        CASE WHEN c.activity IS NULL THEN p.publication_id ELSE c.publication_id END
-            AS publication_id
+        CASE WHEN c.priority <= 3 THEN coalesce(c.from_ns >= c.latest_ns, false) END AS is_certain
     FROM derive.flow_piece('part', 'candidate') AS c
     JOIN part AS p ON c.position = p.position
 ),
@@ -353,21 +351,20 @@ numbered AS (
     FROM named
 ),
 whole AS MATERIALIZED (
-    SELECT
-        run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, part, activity,
-        is_certain, callback_instance_id, publication_id, request_id,
-        row_number() OVER (ORDER BY position, min(from_ns)) AS interval_id,
-        min(from_ns) AS from_ns,
-        arg_max(to_ns, from_ns) AS to_ns,
-        sum(to_ns - from_ns)::BIGINT AS duration_ns
-    FROM numbered
-    GROUP BY
-        run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
-        activity, is_certain, callback_instance_id, publication_id, request_id, island
+    SELECT *, row_number() OVER (ORDER BY position, from_ns) AS interval_id
+    FROM (
+        SELECT
+            * EXCLUDE (from_ns, to_ns),
+            min(from_ns) AS from_ns,
+            arg_max(to_ns, from_ns) AS to_ns,
+            sum(to_ns - from_ns)::BIGINT AS duration_ns
+        FROM numbered
+        GROUP BY ALL
+    )
 ),
 owned AS (
     SELECT
-        w.interval_id, w.flow_rank, w.take_id, w.part, w.activity, w.request_id, w.from_ns, w.to_ns,
+        w.*,
         CASE
             WHEN w.activity IN ('publish', 'intra', 'rclcpp', 'rcl', 'rmw', 'dds') THEN p.thread_id
             ELSE i.thread_id

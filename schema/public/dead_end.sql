@@ -132,7 +132,6 @@ descent (node_id, subscription_id) AS (
     JOIN store.flow_hop AS h ON d.subscription_id = h.from_subscription_id
 ),
 open AS MATERIALIZED (
-    SELECT o.node_id, o.subscription_id, o.publisher_id
     FROM output AS o
     ANTI JOIN descent AS d ON o.node_id = d.node_id AND o.subscription_id = d.subscription_id
 ),
@@ -156,9 +155,9 @@ supposed_descent (node_id, subscription_id) AS (
     JOIN onward AS h ON d.subscription_id = h.from_subscription_id
 ),
 loop AS (
-    SELECT node_id, subscription_id FROM descent
+    FROM descent
     UNION
-    SELECT node_id, subscription_id FROM supposed_descent
+    FROM supposed_descent
 )
 SELECT
     o.run_id, o.node_id, o.subscription_id, s.topic_name, o.message_count, o.publisher_id,

@@ -81,9 +81,7 @@ root AS MATERIALIZED (
 ),
 stored AS MATERIALIZED (SELECT take_id FROM derive.stored_take WHERE list_contains(runs, run_id)),
 transport AS NOT MATERIALIZED (
-    SELECT
-        publication_id, publisher_id, take_id, subscription_id, is_ambiguous,
-        take_id IN (SELECT take_id FROM stored) AS is_stored
+    SELECT *, take_id IN (SELECT take_id FROM stored) AS is_stored
     FROM derive.flow_transport
     WHERE list_contains(runs, run_id)
 ),
@@ -120,9 +118,7 @@ reached (path_id, root_key, take_id, is_stored, is_ambiguous) AS (
     GROUP BY p.path_id, r.root_key, s.take_id
 ),
 arrival AS MATERIALIZED (
-    SELECT
-        r.path_id, r.root_key, r.take_id, r.is_stored, r.is_ambiguous, t.taken_ns, i.start_ns,
-        i.end_ns, i.callback_instance_id
+    SELECT r.*, t.taken_ns, i.start_ns, i.end_ns, i.callback_instance_id
     FROM reached AS r
     JOIN path AS p ON r.path_id = p.path_id AND p.is_path
     JOIN main.take AS t ON r.take_id = t.take_id
@@ -158,17 +154,16 @@ expected AS MATERIALIZED (
     GROUP BY p.run_id, p.path_id, r.root_key
 ),
 missing AS MATERIALIZED (
-    SELECT e.run_id, e.path_id, e.root_key, e.root_ns, e.publication_id
     FROM expected AS e
     ANTI JOIN pair AS a ON e.path_id = a.path_id AND e.root_key = a.root_key
 ),
 -- All flows go through here: what is said of a path or of a missing arrival is added at the end.
 outcome AS MATERIALIZED (
-    SELECT a.path_id, a.root_key, e.root_ns, a.take_id, a.sink_ns, a.is_stored, a.is_ambiguous
+    SELECT a.*, e.root_ns
     FROM pair AS a
     JOIN expected AS e ON a.path_id = e.path_id AND a.root_key = e.root_key
-    UNION ALL
-    SELECT path_id, root_key, root_ns, NULL, NULL, false, false FROM missing
+    UNION ALL BY NAME
+    SELECT path_id, root_key, root_ns, false AS is_stored, false AS is_ambiguous FROM missing
 ),
 longest AS (SELECT path_id, max(sink_ns - root_ns) AS longest_ns FROM outcome GROUP BY path_id),
 -- With time enough for the longest flow it is not the recording that cut a root.
@@ -193,8 +188,7 @@ gap AS (
 ),
 ranked AS (
     SELECT
-        p.run_id, o.path_id, o.root_key, o.root_ns, o.take_id, o.sink_ns, o.is_stored,
-        o.is_ambiguous,
+        o.*, p.run_id,
         coalesce(o.sink_ns, o.root_ns + coalesce(l.longest_ns, 0)) AS until_ns,
         row_number() OVER of_root = 1 AS is_first,
         lead(true) OVER of_root IS NULL AS is_last,

@@ -50,19 +50,12 @@ SELECT
     is_loss_affected, is_ambiguous
 FROM united
 WINDOW
-    of_root AS (
-        PARTITION BY run_id, first_topic, last_topic, node, root_kind, root_id
-        ORDER BY sink_ns, take_id
-    ),
-    to_root AS (
-        PARTITION BY run_id, first_topic, last_topic, node, root_kind, root_id
-        ORDER BY take_id IS NULL, sink_ns DESC, take_id DESC
-    ),
+    root AS (PARTITION BY run_id, first_topic, last_topic, node, root_kind, root_id),
+    of_root AS (root ORDER BY sink_ns, take_id),
+    to_root AS (root ORDER BY take_id IS NULL, sink_ns DESC, take_id DESC),
     of_take AS (
         PARTITION BY run_id, first_topic, last_topic, node, take_id
         ORDER BY root_ns DESC, root_kind DESC, root_id DESC
     )
 -- A root that arrived by one path did not fail by another.
-QUALIFY take_id IS NOT NULL OR count(take_id) OVER (
-    PARTITION BY run_id, first_topic, last_topic, node, root_kind, root_id
-) = 0
+QUALIFY take_id IS NOT NULL OR count(take_id) OVER root = 0

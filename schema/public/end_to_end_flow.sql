@@ -18,9 +18,6 @@ WITH outcome AS NOT MATERIALIZED (
         max_depth := max_depth, max_paths := max_paths
     )
 )
-SELECT
-    flow_id, run_id, path_id, root_kind, root_id, root_ns, take_id, sink_event, sink_ns, latency_ns,
-    is_ambiguous
 FROM main.chosen_flow(
     'outcome', flow_case, sink_take_id := sink_take_id, most_flows := most_flows,
     at_quantile := at_quantile, path_ids := path_ids

@@ -28,7 +28,4 @@ trail AS MATERIALIZED (
         'flow', runs, from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     )
 )
-SELECT
-    run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, position, part,
-    from_ns, to_ns, duration_ns, callback_instance_id, publication_id
 FROM main.end_to_end_piece('flow', 'trail', runs)

@@ -233,7 +233,7 @@ placed AS (
 -- The layers follow each other in time, everything else in the order of causes.
 begun AS (
     SELECT
-        run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns, hop, place, parts,
+        *,
         len(turn) > 0 AS is_turning,
         list_filter(
             [

@@ -157,7 +157,6 @@ numbered AS MATERIALIZED (
     JOIN walk AS w ON 2 * l.list_id = w.point
 ),
 ended AS (
-    SELECT c.run_id, c.depth, c.number, c.subscription_id, c.visited, c.is_last
     FROM chain AS c
     ANTI JOIN chain AS n
         ON c.run_id = n.run_id AND c.depth + 1 = n.depth AND c.number = n.parent_number

@@ -36,7 +36,7 @@ FROM (
     FROM seen AS s
     JOIN main.stack AS k ON s.stack_id = k.stack_id
 ) AS s
-JOIN (SELECT stack_id, stack_frame_id FROM within) AS w ON s.stack_id = w.stack_id
+JOIN within AS w ON s.stack_id = w.stack_id
 JOIN whole AS a ON s.group_id IS NOT DISTINCT FROM a.group_id
 CROSS JOIN LATERAL (SELECT s.self_id = w.stack_frame_id AS is_self)
 GROUP BY s.group_id, w.stack_frame_id

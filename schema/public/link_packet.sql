@@ -6,7 +6,7 @@
 -- column: protocol, source_address, source_port, destination_address, destination_port,
 --     identification, sequence_number
 WITH trace_clock AS (
-    SELECT t.trace_id, c.offset_ns, c.drift_ppb, c.reference_ns
+    SELECT t.trace_id, c.*
     FROM store.trace AS t
     JOIN store.host AS h ON t.host_id = h.host_id
     JOIN store.clock AS c ON h.clock_id = c.clock_id

@@ -47,9 +47,9 @@ behind (sink_id, subscription_id) AS (
     JOIN hop AS h ON b.subscription_id = h.subscription_id
 ),
 member AS MATERIALIZED (
-    SELECT sink_id, subscription_id FROM ahead
+    FROM ahead
     INTERSECT
-    SELECT sink_id, subscription_id FROM behind
+    FROM behind
 ),
 round AS MATERIALIZED (
     SELECT DISTINCT a.subscription_id AS from_subscription_id, b.subscription_id

@@ -10,9 +10,7 @@
 -- column: uncertainty_ns BIGINT [ns]  Bound of the error of the latency; NULL: not known, as the
 --     clocks were not brought together
 WITH place AS (
-    SELECT
-        p.process_id, h.host_id, h.clock_id, c.offset_ns, c.drift_ppb, c.reference_ns,
-        c.reference_clock_id, c.uncertainty_ns
+    SELECT p.process_id, h.host_id, c.*
     FROM store.process AS p
     JOIN store.host AS h ON p.host_id = h.host_id
     JOIN store.clock AS c ON h.clock_id = c.clock_id

@@ -40,17 +40,17 @@ WITH RECURSIVE state AS MATERIALIZED (
 chain AS (
     SELECT
         i.interval_id, 0::BIGINT AS wakers,
-        greatest(s.start_ns, i.from_ns) AS from_ns, least(s.end_ns, i.to_ns) AS to_ns,
-        s.thread_id, s.state, s.priority, s.by_kind, s.by_thread_id, s.by_other_thread_id,
-        s.by_priority, s.is_loss_affected
+        greatest(s.start_ns, i.from_ns) AS from_ns,
+        least(s.end_ns, i.to_ns) AS to_ns,
+        s.* EXCLUDE (start_ns, end_ns)
     FROM query_table(intervals) AS i
     JOIN state AS s ON i.thread_id = s.thread_id AND s.end_ns > i.from_ns AND s.start_ns < i.to_ns
     UNION ALL
     SELECT
         c.interval_id, c.wakers + 1,
-        greatest(s.start_ns, c.from_ns), least(s.end_ns, c.to_ns),
-        s.thread_id, s.state, s.priority, s.by_kind, s.by_thread_id, s.by_other_thread_id,
-        s.by_priority, s.is_loss_affected
+        greatest(s.start_ns, c.from_ns),
+        least(s.end_ns, c.to_ns),
+        s.* EXCLUDE (start_ns, end_ns)
     FROM chain AS c
     JOIN state AS s
         ON c.by_thread_id = s.thread_id AND s.end_ns > c.from_ns AND s.start_ns < c.to_ns
@@ -77,9 +77,7 @@ piece AS MATERIALIZED (
 ),
 -- The states of one length of the chain follow each other: the longest chain tells most.
 told AS (
-    SELECT
-        p.interval_id, p.from_ns, c.to_ns, c.wakers, c.thread_id, c.state, c.priority, c.by_kind,
-        c.by_thread_id, c.by_other_thread_id, c.by_priority, c.is_loss_affected
+    SELECT c.* REPLACE (p.from_ns AS from_ns)
     FROM (
         SELECT p.interval_id, p.from_ns, w.wakers
         FROM piece AS p
