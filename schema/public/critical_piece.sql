@@ -322,20 +322,19 @@ candidate AS (
 ),
 named AS (
     SELECT
-        p.* REPLACE (
-            c.from_ns AS from_ns, c.to_ns AS to_ns,
-            CASE WHEN c.activity IS NULL THEN p.callback_instance_id ELSE c.callback_instance_id
-                END AS callback_instance_id,
-            CASE WHEN c.activity IS NULL THEN p.publication_id ELSE c.publication_id END
-                AS publication_id
-        ),
+        p.run_id, p.path_id, p.root_kind, p.root_id, p.take_id, p.latency_ns, p.flow_rank, p.hop,
+        p.part, p.position, p.request_id, c.from_ns, c.to_ns,
         CASE
             WHEN c.activity IS NOT NULL THEN c.activity
             WHEN p.part NOT IN ('publish_to_take', 'request_to_take') THEN p.part
             WHEN p.callback_instance_id IS NULL AND p.to_ns > p.from_ns THEN 'undecided'
             ELSE 'network_or_idle'
         END AS activity,
-        CASE WHEN c.priority <= 3 THEN coalesce(c.from_ns >= c.latest_ns, false) END AS is_certain
+        CASE WHEN c.priority <= 3 THEN coalesce(c.from_ns >= c.latest_ns, false) END AS is_certain,
+        CASE WHEN c.activity IS NULL THEN p.callback_instance_id ELSE c.callback_instance_id END
+            AS callback_instance_id,
+        CASE WHEN c.activity IS NULL THEN p.publication_id ELSE c.publication_id END
+            AS publication_id
     FROM derive.flow_piece('part', 'candidate') AS c
     JOIN part AS p ON c.position = p.position
 ),
@@ -351,16 +350,17 @@ numbered AS (
     FROM named
 ),
 whole AS MATERIALIZED (
-    SELECT *, row_number() OVER (ORDER BY position, from_ns) AS interval_id
-    FROM (
-        SELECT
-            * EXCLUDE (from_ns, to_ns),
-            min(from_ns) AS from_ns,
-            arg_max(to_ns, from_ns) AS to_ns,
-            sum(to_ns - from_ns)::BIGINT AS duration_ns
-        FROM numbered
-        GROUP BY ALL
-    )
+    SELECT
+        run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, part, activity,
+        is_certain, callback_instance_id, publication_id, request_id,
+        row_number() OVER (ORDER BY position, min(from_ns)) AS interval_id,
+        min(from_ns) AS from_ns,
+        arg_max(to_ns, from_ns) AS to_ns,
+        sum(to_ns - from_ns)::BIGINT AS duration_ns
+    FROM numbered
+    GROUP BY
+        run_id, path_id, root_kind, root_id, take_id, latency_ns, flow_rank, hop, position, part,
+        activity, is_certain, callback_instance_id, publication_id, request_id, island
 ),
 owned AS (
     SELECT

@@ -42,7 +42,7 @@ chain AS (
         i.interval_id, 0::BIGINT AS wakers,
         greatest(s.start_ns, i.from_ns) AS from_ns,
         least(s.end_ns, i.to_ns) AS to_ns,
-        s.* EXCLUDE (start_ns, end_ns)
+        s.*
     FROM query_table(intervals) AS i
     JOIN state AS s ON i.thread_id = s.thread_id AND s.end_ns > i.from_ns AND s.start_ns < i.to_ns
     UNION ALL
@@ -50,7 +50,7 @@ chain AS (
         c.interval_id, c.wakers + 1,
         greatest(s.start_ns, c.from_ns),
         least(s.end_ns, c.to_ns),
-        s.* EXCLUDE (start_ns, end_ns)
+        s.*
     FROM chain AS c
     JOIN state AS s
         ON c.by_thread_id = s.thread_id AND s.end_ns > c.from_ns AND s.start_ns < c.to_ns
