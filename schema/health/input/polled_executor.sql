@@ -15,8 +15,7 @@ SELECT
         'polled %d times, of %d waits in all', sum(f.polls)::BIGINT, sum(f.waits)::BIGINT
     ) AS detail
 FROM staging.executor_first AS f
-JOIN staging.thread AS t ON f.thread_id = t.thread_id
-JOIN process_label AS l ON t.process_id = l.process_id
+JOIN process_label AS l ON f.process_id = l.process_id
 -- Any program may poll once before it spins.
 WHERE f.polls > 1 AND 2 * f.polls > f.waits
-GROUP BY t.process_id, l.label
+GROUP BY f.process_id, l.label
