@@ -79,8 +79,8 @@ CREATE TABLE staging.exchange (is_request BOOLEAN, event_at_client BIGINT, event
 CREATE TABLE staging.executor (executor_id BIGINT, process_id BIGINT, kind VARCHAR,
     is_inferred BOOLEAN, thread_ids BIGINT[], executor_event_id BIGINT);
 CREATE TABLE staging.executor_callback (executor_event_id BIGINT, callback_instance_id BIGINT);
-CREATE TABLE staging.executor_first (thread_id BIGINT, event_id BIGINT, waits BIGINT, polls BIGINT,
-    is_undelimited BOOLEAN);
+CREATE TABLE staging.executor_first (thread_id BIGINT, process_id BIGINT, event_id BIGINT,
+    waits BIGINT, polls BIGINT, is_undelimited BOOLEAN);
 CREATE TABLE staging.executor_named (event_id BIGINT, process_id BIGINT, executor_addr UBIGINT,
     kind VARCHAR);
 CREATE TABLE staging.executor_thread (executor_id BIGINT, thread_id BIGINT);

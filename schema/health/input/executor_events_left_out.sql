@@ -9,10 +9,7 @@
 -- severity: warning
 -- when: staging.executor_first WHERE is_undelimited, staging.executor_named
 WITH left_out AS (
-    SELECT t.process_id, f.thread_id
-    FROM staging.executor_first AS f
-    JOIN staging.thread AS t ON f.thread_id = t.thread_id
-    WHERE f.is_undelimited
+    SELECT process_id, thread_id FROM staging.executor_first WHERE is_undelimited
     UNION
     -- CARET names the kind of the executor. These kinds have events.
     SELECT p.process_id, p.thread_id

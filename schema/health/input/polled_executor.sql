@@ -9,13 +9,12 @@
 -- severity: warning
 -- when: staging.executor_first WHERE polls > 1
 SELECT
-    t.process_id,
+    f.process_id,
     sum(f.polls)::BIGINT AS count,
     printf(
         'polled %d times, of %d waits in all', sum(f.polls)::BIGINT, sum(f.waits)::BIGINT
     ) AS detail
 FROM staging.executor_first AS f
-JOIN staging.thread AS t ON f.thread_id = t.thread_id
 -- Any program may poll once before it spins.
 WHERE f.polls > 1 AND 2 * f.polls > f.waits
-GROUP BY t.process_id
+GROUP BY f.process_id

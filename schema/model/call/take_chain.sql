@@ -1,5 +1,5 @@
--- description: Layers of one take stitched together, as `staging.call` says, and the subscription
---     that took. A take whose rmw layer failed does not count, although upper layers may report it.
+-- description: Layers of one take stitched together, as for publications, and the subscription that
+--     took. A take whose rmw layer failed does not count, although upper layers may report it.
 --     Nor does a take of the middleware itself. It has no rcl layer, although rcl takes are traced.
 --     Its reader belongs to no rcl subscription, and never had an rcl layer. The subscription is
 --     the one of the rmw handle or ring buffer that was initialised last before the take; NULL
@@ -11,8 +11,8 @@
 --     raw.ros2_dispatch_subscription_callback, raw.ros2_rclcpp_ring_buffer_dequeue,
 --     raw.agnocast_agnocast_create_callable, raw.agnocast_agnocast_take
 
--- What is taken out of ring buffers. The buffer that a transient-local publisher keeps belongs to no
--- subscription.
+-- What is taken out of ring buffers. The buffer that a transient-local publisher keeps belongs to
+-- no subscription.
 -- when: raw.ros2_rclcpp_ring_buffer_dequeue
 -- columns: start_event_id BIGINT, end_event_id BIGINT, trace_index INTEGER, thread_id BIGINT,
 --     process_id BIGINT, taken_ns BIGINT, method VARCHAR, buffer_handle UBIGINT,
@@ -65,38 +65,58 @@ FROM staging.with_latest('called', 'callback')
 UNION ALL
 SELECT * FROM staging.with_latest('polled', 'subscription');
 
-WITH layer AS (
+WITH middleware AS (
     SELECT
-        *,
-        event_id AS last_event_id,
-        buffer AS message,
-        'dds' AS layer,
-        []::VARCHAR[] AS follows
-    FROM raw.dds_read
-    UNION ALL BY NAME
-    SELECT *, source_timestamp AS stamp, 'rmw' AS layer, ['dds'] AS follows FROM raw.ros2_rmw_take
-    UNION ALL BY NAME
-    SELECT *, 'rcl' AS layer, ['rmw'] AS follows FROM raw.ros2_rcl_take
-    UNION ALL BY NAME
-    SELECT *, 'rclcpp' AS layer, ['rmw', 'rcl'] AS follows FROM raw.ros2_rclcpp_take
-    UNION ALL BY NAME
-    SELECT *, source_stamp AS stamp, 'caret' AS layer, ['rmw', 'rcl', 'rclcpp'] AS follows
-    FROM raw.ros2_dispatch_subscription_callback
+        coalesce(d.event_id, m.event_id) AS event_id,
+        m.event_id AS end_event_id,
+        m.trace_index, m.thread_index, m.message, m.taken,
+        m.ts_ns AS rmw_ns,
+        m.rmw_subscription_handle AS rmw_handle,
+        nullif(m.source_timestamp, 0) AS stamp
+    FROM staging.call('ros2_rmw_take') AS m
+    LEFT JOIN raw.dds_read AS d ON m.previous_event_id = d.event_id AND m.message = d.buffer
+),
+rcl AS (
+    SELECT
+        coalesce(m.event_id, r.event_id) AS event_id,
+        coalesce(r.event_id, m.end_event_id) AS end_event_id,
+        coalesce(m.trace_index, r.trace_index) AS trace_index,
+        coalesce(m.thread_index, r.thread_index) AS thread_index,
+        coalesce(m.message, r.message) AS message,
+        m.taken, m.rmw_ns,
+        r.ts_ns AS rcl_ns,
+        m.rmw_handle, m.stamp
+    FROM middleware AS m
+    FULL JOIN staging.call('ros2_rcl_take') AS r
+        ON m.end_event_id = r.previous_event_id AND m.message = r.message
+),
+rclcpp AS (
+    SELECT
+        r.* REPLACE (
+            coalesce(r.event_id, u.event_id) AS event_id,
+            coalesce(u.event_id, r.end_event_id) AS end_event_id,
+            coalesce(r.trace_index, u.trace_index) AS trace_index,
+            coalesce(r.thread_index, u.thread_index) AS thread_index,
+            coalesce(r.message, u.message) AS message
+        )
+    FROM rcl AS r
+    FULL JOIN staging.call('ros2_rclcpp_take') AS u
+        ON r.end_event_id = u.previous_event_id AND r.message = u.message
 ),
 chain AS (
     SELECT
-        thread_index,
-        min(event_id) AS event_id,
-        max(event_id) AS end_event_id,
-        arg_min(trace_index, event_id) AS trace_index,
-        any_value(ts_ns) FILTER (layer = 'rmw') AS rmw_ns,
-        any_value(ts_ns) FILTER (layer = 'rcl') AS rcl_ns,
-        any_value(ts_ns) FILTER (layer = 'caret') AS caret_ns,
-        any_value(rmw_subscription_handle) AS rmw_handle,
-        arg_min(nullif(stamp, 0)::BIGINT, event_id) AS stamp
-    FROM staging.call('layer')
-    GROUP BY thread_index, call_number
-    HAVING bool_or(layer <> 'dds') AND any_value(taken) IS DISTINCT FROM 0
+        coalesce(r.event_id, c.event_id) AS event_id,
+        coalesce(c.event_id, r.end_event_id) AS end_event_id,
+        coalesce(r.trace_index, c.trace_index) AS trace_index,
+        coalesce(r.thread_index, c.thread_index) AS thread_index,
+        r.rmw_ns, r.rcl_ns,
+        c.ts_ns AS caret_ns,
+        r.rmw_handle,
+        coalesce(r.stamp, nullif(c.source_stamp, 0)::BIGINT) AS stamp
+    FROM rclcpp AS r
+    FULL JOIN staging.call('ros2_dispatch_subscription_callback') AS c
+        ON r.end_event_id = c.previous_event_id AND r.message = c.message
+    WHERE r.taken IS DISTINCT FROM 0
 ),
 located AS (FROM staging.located('chain')),
 rcl_reader AS (SELECT DISTINCT process_id, rmw_handle FROM located WHERE rcl_ns IS NOT NULL),

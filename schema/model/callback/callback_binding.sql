@@ -76,12 +76,8 @@ WITH begun AS NOT MATERIALIZED (
     FROM staging.callback_run
 ),
 known AS (SELECT event_id, process_id, callback_handle AS handle FROM staging.callback_known),
-resolved AS NOT MATERIALIZED (FROM staging.with_latest('begun', 'known')),
 first_run AS (
-    SELECT process_id, handle, min(event_id) AS event_id
-    FROM resolved
-    WHERE object_event_id IS NULL
-    GROUP BY process_id, handle
+    SELECT process_id, handle, min(event_id) AS event_id FROM begun GROUP BY process_id, handle
 ),
 run AS (
     SELECT
@@ -96,7 +92,7 @@ run AS (
             WHEN coalesce(b.previous_executor_event_id < b.previous_event_id, true)
                 THEN b.previous_event_id
         END AS called_by_event_id
-    FROM resolved AS b
+    FROM staging.with_latest('begun', 'known') AS b
     LEFT JOIN staging.callback_known AS k ON b.object_event_id = k.event_id
     LEFT JOIN first_run AS f
         ON b.object_event_id IS NULL AND b.process_id = f.process_id AND b.handle = f.handle

@@ -6,33 +6,28 @@
 
 -- Threads of one executor that its lock shows: the threads of a process take turns in waiting for
 -- work, and no two of them ever wait at once. Threads of several executors do.
--- when: raw.ros2_rclcpp_executor_wait_for_work
+-- when: staging.executor_first WHERE process_id IN (
+--     SELECT process_id FROM staging.executor_first GROUP BY process_id HAVING count(*) > 1)
 -- columns: thread_id BIGINT, first_event_id BIGINT
 CREATE OR REPLACE TEMP TABLE executor_alternating AS
-WITH spinning AS (
-    SELECT f.thread_id, t.process_id, f.event_id
-    FROM staging.executor_first AS f
-    JOIN staging.thread AS t ON f.thread_id = t.thread_id
-),
-several AS (
+WITH several AS (
     SELECT process_id, min(event_id) AS first_event_id
-    FROM spinning
+    FROM staging.executor_first
     GROUP BY process_id
     HAVING count(*) > 1
 ),
 turn AS (
     SELECT
-        s.process_id,
+        e.process_id,
         e.thread_id <> lag(e.thread_id) OVER in_process AS is_other,
         sum((e.kind = 'wait')::INTEGER - coalesce(e.previous_kind = 'wait', false)::INTEGER)
             OVER in_process AS waiting
     FROM staging.executor_event AS e
-    JOIN spinning AS s ON e.thread_id = s.thread_id
-    WHERE s.process_id IN (SELECT process_id FROM several)
-    WINDOW in_process AS (PARTITION BY s.process_id ORDER BY e.event_id)
+    WHERE e.process_id IN (SELECT process_id FROM several)
+    WINDOW in_process AS (PARTITION BY e.process_id ORDER BY e.event_id)
 )
 SELECT s.thread_id, p.first_event_id
-FROM spinning AS s
+FROM staging.executor_first AS s
 JOIN several AS p ON s.process_id = p.process_id
 WHERE s.process_id IN (
     -- Ten turns: once, one may have begun when another had ended.
@@ -42,34 +37,36 @@ WHERE s.process_id IN (
     HAVING max(waiting) = 1 AND count(*) FILTER (WHERE is_other) >= 10
 );
 
+-- Threads of the executors that are named. If a thread serves several of them, it belongs to the one
+-- whose callbacks it ran most.
+-- when: staging.callback_group_member, staging.python_mark WHERE kind = 'executor'
+-- columns: thread_id BIGINT, executor_event_id BIGINT
+CREATE OR REPLACE TEMP TABLE thread_executor AS
+SELECT thread_id, executor_event_id
+FROM (
+    SELECT r.thread_id, s.executor_event_id, count(*) AS run_count
+    FROM staging.callback_run AS r
+    JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
+    JOIN staging.callback_group_member AS s ON n.callback_id = s.callback_id
+    WHERE r.depth = 1 AND s.executor_event_id IS NOT NULL
+    GROUP BY r.thread_id, s.executor_event_id
+    UNION ALL
+    SELECT m.thread_id, min(x.event_id), 0
+    FROM staging.python_mark AS m
+    JOIN staging.executor_named AS x
+        ON m.process_id = x.process_id AND m.number = x.executor_addr
+    WHERE m.kind = 'executor'
+    GROUP BY m.thread_id
+)
+QUALIFY row_number() OVER (
+    PARTITION BY thread_id ORDER BY run_count DESC, executor_event_id
+) = 1;
+
 -- Which threads work for the same executor: those of a process that execute callbacks of an
 -- executor that names itself, else the same callbacks, directly or through others, or that take
 -- turns in waiting for work. The smallest thread of such a group stands for it.
 CREATE OR REPLACE TEMP TABLE executor_member AS
 WITH RECURSIVE
--- Threads of the executors that are named. If a thread serves several of them, it belongs to
--- the one whose callbacks it ran most.
-thread_executor AS MATERIALIZED (
-    SELECT thread_id, executor_event_id
-    FROM (
-        SELECT r.thread_id, s.executor_event_id, count(*) AS run_count
-        FROM staging.callback_run AS r
-        JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
-        JOIN staging.callback_group_member AS s ON n.callback_id = s.callback_id
-        WHERE r.depth = 1 AND s.executor_event_id IS NOT NULL
-        GROUP BY r.thread_id, s.executor_event_id
-        UNION ALL
-        SELECT m.thread_id, min(x.event_id), 0
-        FROM staging.python_mark AS m
-        JOIN staging.executor_named AS x
-            ON m.process_id = x.process_id AND m.number = x.executor_addr
-        WHERE m.kind = 'executor'
-        GROUP BY m.thread_id
-    )
-    QUALIFY row_number() OVER (
-        PARTITION BY thread_id ORDER BY run_count DESC, executor_event_id
-    ) = 1
-),
 -- What ties threads: an executor by its event, or a callback by its (never negative) identity.
 runs AS (
     SELECT thread_id, -1 - executor_event_id AS tie_id FROM thread_executor

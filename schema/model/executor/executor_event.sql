@@ -10,7 +10,7 @@ WITH event AS (
     SELECT *, 'execute' AS kind FROM raw.ros2_rclcpp_executor_execute
 )
 SELECT
-    event_id, ts_ns, thread_id, kind, timeout,
+    event_id, ts_ns, process_id, thread_id, kind, timeout,
     previous_executor_event_id AS previous_event_id,
     previous_executor_ts_ns AS previous_ns,
     previous_executor_label AS previous_kind
