@@ -11,13 +11,13 @@ import os
 import posixpath
 import re
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 from urllib.parse import urlsplit
 
 from pyarrow import fs
@@ -25,6 +25,8 @@ from pyarrow import fs
 from msgflow.errors import DatabaseError, UsageError, require_utf8
 from msgflow.files.temporary_owner import mark
 from msgflow.trace.regular_file import open_regular
+
+_T = TypeVar("_T")
 
 S3 = "s3://"
 MOST_ATTEMPTS = 6
@@ -139,10 +141,14 @@ class Store:
     def read(self, path: str, most: int | None = None) -> bytes | None:
         """Return the content of a small file, None if there is no such file."""
         self._require_here(path)
+
+        def read() -> bytes:
+            with self._reading(path) as stream:
+                return bytes(stream.read() if most is None else stream.read(most + 1))
+
         with _reaching(self.url):
             try:
-                with self._reading(path) as stream:
-                    content = bytes(stream.read() if most is None else stream.read(most + 1))
+                content = self._downloaded(read)
             except FileNotFoundError:
                 return None
         if most is not None and len(content) > most:
@@ -155,12 +161,24 @@ class Store:
     def fetch(self, path: str, target: Path) -> None:
         """Copy a file into a new local file."""
         self._require_here(path)
-        with (
-            _reaching(self.url),
-            self._reading(path) as stream,
-            target.open("wb") as file,
-        ):
-            shutil.copyfileobj(stream, file, _CHUNK)
+
+        def copy() -> None:
+            with self._reading(path) as stream, target.open("wb") as file:
+                shutil.copyfileobj(stream, file, _CHUNK)
+
+        with _reaching(self.url):
+            self._downloaded(copy)
+
+    def _downloaded(self, work: Callable[[], _T]) -> _T:
+        """Return what `work` reads; once more if that breaks off, as only its begin is repeated."""
+        try:
+            return work()
+        except FileNotFoundError:
+            raise
+        except OSError:
+            if self.is_local:
+                raise
+            return work()
 
     def local_files(self, paths: Sequence[str], folder: Path) -> list[str]:
         """Return where files can be read here: those of a bucket are copied into this folder."""

@@ -97,7 +97,7 @@ def test_much_goes_wrong(
     assert again.returncode == 1, said
     assert "1 failed" in said
     assert bucket.refused > 5
-    assert not watcher.errors
+    assert not watcher.errors, watcher.errors
     lake = Lake.open(LAKE)
     runs = lake.runs().to_pylist()
     assert sorted(run["name"] for run in runs) == [f"r{number}" for number in range(GOOD)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 from object_store import KEYS, ObjectStore, object_store
@@ -134,6 +135,28 @@ def test_a_store_that_is_not_there(bucket: ObjectStore, monkeypatch: pytest.Monk
     monkeypatch.setattr("msgflow.fleet.file_store.MOST_ATTEMPTS", 1)
     with pytest.raises(DatabaseError, match="cannot read the store"):
         Store("s3://fleet/lake").read("lake.json")
+
+
+def test_a_download_that_breaks_off_is_repeated_once(
+    bucket: ObjectStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bucket.put("fleet/broken/off", b"all")
+    store, reading, left = Store("s3://fleet/broken"), Store._reading, [1]
+
+    def breaking(self: Store, path: str) -> Any:
+        if left[0]:
+            left[0] -= 1
+            raise OSError("AWS Error INTERNAL_FAILURE during GetObject operation")
+        return reading(self, path)
+
+    monkeypatch.setattr(Store, "_reading", breaking)
+    assert store.read("off") == b"all"
+    left[0] = 1
+    store.fetch("off", tmp_path / "off")
+    assert (tmp_path / "off").read_bytes() == b"all"
+    left[0] = 2
+    with pytest.raises(DatabaseError, match="INTERNAL_FAILURE"):
+        store.read("off")
 
 
 @pytest.mark.thorough
