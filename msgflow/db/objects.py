@@ -121,7 +121,7 @@ def definition_hash() -> str:
     layers = (*VIEW_LAYERS, HEALTH)
     in_layers = (path for layer in layers for path in sorted((root / layer).rglob("*.sql")))
     modules = (Path(__file__).with_name(name) for name in _MODULES)
-    paths = (store_file(), *in_layers, *modules)
+    paths = (store_file(), root / "vocabulary.sql", *in_layers, *modules)
     return hash_of(text for path in paths for text in (path.name, path.read_text(encoding="utf-8")))
 
 
