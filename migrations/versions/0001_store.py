@@ -95,9 +95,9 @@ CREATE TABLE store.simulated_time (
     simulated_ns BIGINT NOT NULL
 );
 CREATE TABLE store.stamp_clock (
-    run_id BIGINT NOT NULL, clock_id BIGINT NOT NULL, at_ns BIGINT NOT NULL,
-    start_ns BIGINT NOT NULL, end_ns BIGINT NOT NULL, difference_ns BIGINT NOT NULL,
-    drift_ppb BIGINT, message_count BIGINT, segment BIGINT, is_sharp BOOLEAN
+    run_id BIGINT NOT NULL, clock_id BIGINT NOT NULL, start_ns BIGINT, end_ns BIGINT,
+    at_ns BIGINT NOT NULL, difference_ns BIGINT NOT NULL, drift_ppb BIGINT NOT NULL,
+    slack_ns BIGINT NOT NULL
 );
 CREATE TABLE store.executor (
     executor_id BIGINT NOT NULL, run_id BIGINT NOT NULL, process_id BIGINT NOT NULL,

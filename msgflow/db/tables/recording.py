@@ -157,18 +157,24 @@ table(
 table(
     "stamp_clock",
     reference("clock_id", "Clock of the traces", required=True),
-    moment("at_ns", "Middle of the stretch, time of the traces", required=True),
-    moment("start_ns", "Begin of the stretch", required=True),
-    moment("end_ns", "End of the stretch, exclusive", required=True),
+    moment("start_ns", "First stamp of the time, by the clock of ROS; NULL: from the begin"),
+    moment("end_ns", "Last stamp; NULL: until the end"),
+    moment("at_ns", "Stamp at which the difference holds", required=True),
     number(
         "difference_ns",
         "Clock of ROS less clock of the traces, with the shortest delay of a stamp",
         unit="ns",
         required=True,
     ),
-    number("drift_ppb", "Change of the difference in the stretch", unit="ppb"),
-    number("message_count", "Messages that agree with it"),
-    number("segment", "Number of jumps of the clock before it"),
-    column("is_sharp", "Publications microseconds apart can be distinguished; NULL: yes", BOOLEAN),
-    comment="One row per stretch of time in which stamps run along a clock of the traces",
+    number("drift_ppb", "How fast the difference changes", unit="ppb", required=True),
+    number(
+        "slack_ns",
+        "The messages fit differences that are up to so much apart",
+        unit="ns",
+        required=True,
+    ),
+    comment=(
+        "One row per time between two steps of the clock that stamps messages, as far as it is "
+        "certain how it runs along a clock of the traces"
+    ),
 )
