@@ -89,7 +89,7 @@ def declare_links(
         }
     )
     with registered(con, matched=given):
-        internal_sql().keep(con, "declared_link", {"run_id": run_id})
+        internal_sql().keep(con, "link_to_store", {"run_id": run_id})
     for table in ("annotation_input", "annotation_output", "annotation"):
         con.execute(
             f"DELETE FROM store.{table} WHERE run_id = $run_id AND annotation_id IN "
@@ -104,11 +104,11 @@ def declare_links(
     ):
         con.execute(
             f"INSERT INTO store.{table} BY NAME SELECT annotation_id, $run_id AS run_id, {columns} "
-            "FROM declared_link WHERE annotation_id IS NOT NULL",
+            "FROM link_to_store WHERE annotation_id IS NOT NULL",
             {"run_id": run_id},
         )
     ((total, known),) = con.execute(
-        "SELECT count(*), count(*) - count(annotation_id) FROM declared_link"
+        "SELECT count(*), count(*) - count(annotation_id) FROM link_to_store"
     ).fetchall()
     return total, known, topic_count
 

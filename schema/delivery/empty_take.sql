@@ -4,18 +4,19 @@
 --     they may be inside of it.
 -- grain: one row per attempt outside of callbacks
 WITH tried AS (
-    SELECT DISTINCT thread_id, derive.stretch(failed_ns) AS stretch FROM store.failed_take
+    SELECT DISTINCT thread_id, derive.tenth_of_second(failed_ns) AS tenth FROM store.failed_take
 ),
--- The last one tells all of a stretch of time without an attempt.
+-- The last one tells all of a tenth of a second without an attempt.
 begun AS (
     SELECT
         c.run_id, c.thread_id, max(c.start_ns) AS start_ns,
         arg_max_null(c.end_ns, c.start_ns) AS end_ns
     FROM store.callback_instance AS c
-    LEFT JOIN tried AS t ON c.thread_id = t.thread_id AND derive.stretch(c.start_ns) = t.stretch
+    LEFT JOIN tried AS t
+        ON c.thread_id = t.thread_id AND derive.tenth_of_second(c.start_ns) = t.tenth
     GROUP BY
-        c.run_id, c.thread_id, derive.stretch(c.start_ns),
-        CASE WHEN t.stretch IS NOT NULL THEN c.callback_instance_id END
+        c.run_id, c.thread_id, derive.tenth_of_second(c.start_ns),
+        CASE WHEN t.tenth IS NOT NULL THEN c.callback_instance_id END
 )
 SELECT f.run_id, f.subscription_id, f.thread_id, f.failed_ns
 FROM store.failed_take AS f

@@ -87,20 +87,20 @@ pace AS (
     GROUP BY subscription_id
 ),
 -- In most recordings few messages are missing, and to order all others would be most of the work.
--- Of a stretch of time in which none is missing, the first arrival and the first take count.
-missing_stretch AS (
-    SELECT DISTINCT subscription_id, derive.stretch(arrival_ns) AS stretch FROM missing
+-- Of a tenth of a second in which none is missing, the first arrival and the first take count.
+missing_tenth AS (
+    SELECT DISTINCT subscription_id, derive.tenth_of_second(arrival_ns) AS tenth FROM missing
 ),
 condensed AS MATERIALIZED (
     SELECT
         d.subscription_id, d.publisher_id, min(d.arrival_ns) AS arrival_ns,
         min(d.taken_ns) AS taken_ns
     FROM delivered AS d
-    LEFT JOIN missing_stretch AS m
-        ON d.subscription_id = m.subscription_id AND derive.stretch(d.arrival_ns) = m.stretch
+    LEFT JOIN missing_tenth AS m
+        ON d.subscription_id = m.subscription_id AND derive.tenth_of_second(d.arrival_ns) = m.tenth
     GROUP BY
-        d.subscription_id, d.publisher_id, derive.stretch(d.arrival_ns),
-        CASE WHEN m.stretch IS NOT NULL THEN d.publication_id END
+        d.subscription_id, d.publisher_id, derive.tenth_of_second(d.arrival_ns),
+        CASE WHEN m.tenth IS NOT NULL THEN d.publication_id END
 ),
 -- The first take of anything that came later, of the same publisher and of any; what came at the
 -- same moment counts with it.
@@ -192,11 +192,11 @@ known AS (
     SELECT
         m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id, m.arrival_ns,
         m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns, s.last_seen_ns, s.replaced_ns,
-        s.host_end_ns, s.shows_takes, s.is_agnocast, m.arrival_ns
-            - CASE
-                WHEN m.has_one_clock OR e.arrival_ns IS NULL THEN 0
-                ELSE derive.delivery_limit().stamp_slack_ns
-            END AS least_arrival_ns,
+        s.host_end_ns, s.shows_takes, s.is_agnocast,
+        CASE
+            WHEN m.has_one_clock OR e.arrival_ns IS NULL THEN m.arrival_ns
+            ELSE m.arrival_ns - derive.delivery_limit().stamp_slack_ns
+        END AS least_arrival_ns,
         coalesce(c.longest_ns, derive.delivery_limit().longest_ns) AS longest_ns,
         coalesce(c.patience_ns, derive.delivery_limit().longest_ns) AS patience_ns,
         c.usual_ns, p.taken_ns AS publisher_taken_ns, p.arrival_ns AS publisher_arrival_ns,
@@ -237,16 +237,16 @@ due AS MATERIALIZED (
         ) AS publisher_row_length
     FROM known
 ),
-due_stretch AS (SELECT DISTINCT subscription_id, derive.stretch(due_ns) AS stretch FROM due),
--- Of a stretch in which no message is due, only the first wait can be the next one after any.
+due_tenth AS (SELECT DISTINCT subscription_id, derive.tenth_of_second(due_ns) AS tenth FROM due),
+-- Of a tenth in which no message is due, only the first wait can be the next one after any.
 condensed_wait AS (
     SELECT w.subscription_id, min(w.end_ns) AS end_ns, arg_min(w.start_ns, w.end_ns) AS start_ns
     FROM long_wait AS w
-    LEFT JOIN due_stretch AS d
-        ON w.subscription_id = d.subscription_id AND derive.stretch(w.end_ns) = d.stretch
+    LEFT JOIN due_tenth AS d
+        ON w.subscription_id = d.subscription_id AND derive.tenth_of_second(w.end_ns) = d.tenth
     GROUP BY
-        w.subscription_id, derive.stretch(w.end_ns),
-        CASE WHEN d.stretch IS NOT NULL THEN w.end_ns END
+        w.subscription_id, derive.tenth_of_second(w.end_ns),
+        CASE WHEN d.tenth IS NOT NULL THEN w.end_ns END
 ),
 -- When it was certain that the message is not in the queue: the reader waited for long, after the
 -- message had arrived, and before the next message that was taken arrived. That tells nothing if
@@ -294,9 +294,10 @@ bounded AS MATERIALIZED (
     FROM decided
 ),
 -- The place of each missing message among those of its topic, and of the last one before it was
--- gone. Of any other stretch of time the number of messages is enough.
-wanted_stretch AS (
-    SELECT DISTINCT topic_name, clock_id, derive.stretch(unnest([arrival_ns, gone_ns])) AS stretch
+-- gone. Of any other tenth of a second the number of messages is enough.
+wanted_tenth AS (
+    SELECT DISTINCT
+        topic_name, clock_id, derive.tenth_of_second(unnest([arrival_ns, gone_ns])) AS tenth
     FROM bounded
 ),
 ordered AS MATERIALIZED (
@@ -316,13 +317,13 @@ ordered AS MATERIALIZED (
             max(a.arrival_ns) AS arrival_ns,
             count(*) AS message_count
         FROM arrival AS a
-        LEFT JOIN wanted_stretch AS w
+        LEFT JOIN wanted_tenth AS w
             ON a.topic_name = w.topic_name
             AND a.clock_id = w.clock_id
-            AND derive.stretch(a.arrival_ns) IS NOT DISTINCT FROM w.stretch
+            AND derive.tenth_of_second(a.arrival_ns) IS NOT DISTINCT FROM w.tenth
         WHERE (a.topic_name, a.clock_id) IN (SELECT (topic_name, clock_id) FROM missing)
         GROUP BY
-            a.topic_name, a.clock_id, derive.stretch(a.arrival_ns),
+            a.topic_name, a.clock_id, derive.tenth_of_second(a.arrival_ns),
             CASE WHEN w.topic_name IS NOT NULL THEN a.publication_id END
     )
 ),

@@ -53,7 +53,7 @@ INSERT INTO store.process VALUES (1, 1);
 INSERT INTO store.host VALUES (1, 1);
 INSERT INTO store.publisher VALUES (1, 0, 1), (2, 0, 1);
 """
-RULES = ("delivery_limit", "stretch", "undelivered")
+RULES = ("delivery_limit", "tenth_of_second", "undelivered")
 
 
 class Delivery:
@@ -859,15 +859,19 @@ def test_messages_that_arrive_at_the_same_moment_are_newer_alike(delivery: Deliv
     assert delivery.reason(missing) == "overwritten"
 
 
-# Moments of one stretch are looked at one by one: with the first length, all of them.
+# Moments of one tenth of a second are looked at one by one: with the first length, all of them.
 @pytest.mark.parametrize("grid", few([1, 5 * MS], 5 * MS))
 @pytest.mark.parametrize("seed", few(range(5), 0))
-def test_the_length_of_a_stretch_decides_nothing(delivery: Delivery, seed: int, grid: int) -> None:
+def test_the_length_of_a_tenth_of_second_decides_nothing(
+    delivery: Delivery, seed: int, grid: int
+) -> None:
     """Nor where messages arrive at the same moment, or before time begins."""
     fill(delivery.con, random.Random(seed), grid, begin=-300 * MS if grid > 1 else 0)
     found = []
     for length in (1 << 62, 7 * MS, 100 * MS, 30 * MS)[: examples(2, 4)]:
-        delivery.con.execute(f"CREATE OR REPLACE MACRO derive.stretch(at_ns) AS at_ns // {length}")
+        delivery.con.execute(
+            f"CREATE OR REPLACE MACRO derive.tenth_of_second(at_ns) AS at_ns // {length}"
+        )
         rows = delivery.con.execute("FROM derive.undelivered(1) ORDER BY ALL").fetchall()
         found.append(rows)
     assert len({row[-1] for row in found[0]}) > 3

@@ -217,7 +217,7 @@ def test_headers_of_what_the_program_asks_are_those_of_its_sql(
     # Only what is shown as a result declares columns; some of that reads what is made for it.
     made = ("changes", "fleet_comparison", "bag_topic", "change_part")
     made += ("suspect", "verdict", "warm_up", "why_callback", "piece_to_ask", "callback_function")
-    made += ("requirement_verdict", "declared_link")
+    made += ("requirement_verdict", "link_to_store")
     if file.header.columns and name not in made:
         assert described(internal_sql().run(connection, name, values)) == declared(file)
 

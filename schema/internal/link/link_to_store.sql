@@ -22,7 +22,7 @@ added AS (
         + row_number() OVER (ORDER BY place) AS annotation_id
     FROM link AS l
     WHERE NOT EXISTS (
-        FROM link_declared AS d
+        FROM traced_annotation AS d
         WHERE d.kind = l.kind AND d.process_id = l.process_id
             AND coalesce(d.inputs, []) = l.inputs AND coalesce(d.outputs, []) = l.outputs
     )
