@@ -28,12 +28,16 @@
 WITH instance AS (
     SELECT
         run_id, callback_instance_id, callback_id, process_id, thread_id, start_ns,
-        end_ns - start_ns AS duration_ns, depth, take_id, is_loss_affected
+        end_ns - start_ns AS duration_ns,
+        depth, take_id, is_loss_affected
     FROM main.callback_instance
     WHERE list_contains($runs, run_id) AND start_ns >= $start_ns AND start_ns < $end_ns
 ),
 by_topic AS (
-    SELECT l.callback_instance_id, coalesce(p.topic_name, '?') AS topic_name, count(*) AS number
+    SELECT
+        l.callback_instance_id,
+        coalesce(p.topic_name, '?') AS topic_name,
+        count(*) AS number
     FROM main.link_causal AS l
     JOIN instance AS i ON l.callback_instance_id = i.callback_instance_id
     JOIN main.publication AS b ON l.publication_id = b.publication_id
@@ -53,12 +57,14 @@ published AS (
     GROUP BY callback_instance_id
 )
 SELECT
-    i.run_id, i.start_ns, i.duration_ns, s.running_ns, s.preempted_ns, l.node, l.label AS callback,
+    i.run_id, i.start_ns, i.duration_ns, s.running_ns, s.preempted_ns, l.node,
+    l.label AS callback,
     p.topics AS published,
     coalesce(p.number, 0) AS publications,
     printf('%s %d', coalesce(r.name, '?'), r.pid) AS process,
-    t.tid, h.hostname AS host, i.depth, i.take_id, i.is_loss_affected, i.callback_instance_id,
-    i.callback_id, l.is_internal
+    t.tid,
+    h.hostname AS host,
+    i.depth, i.take_id, i.is_loss_affected, i.callback_instance_id, i.callback_id, l.is_internal
 FROM instance AS i
 JOIN main.callback_label AS l ON i.callback_id = l.callback_id
 JOIN main.process AS r ON i.process_id = r.process_id

@@ -28,7 +28,9 @@
 -- note: callbacks
 WITH instance AS (
     SELECT
-        i.run_id, k.alike_id AS callback_id, k.objects, i.start_ns,
+        i.run_id,
+        k.alike_id AS callback_id,
+        k.objects, i.start_ns,
         i.end_ns - i.start_ns AS duration_ns,
         i.start_ns - lag(i.start_ns) OVER (
             PARTITION BY i.callback_id ORDER BY i.start_ns, i.callback_instance_id
@@ -58,14 +60,18 @@ measured AS (
     GROUP BY run_id, callback_id
 )
 SELECT
-    m.run_id, l.node, l.label AS callback, m.objects, m.count, m.open,
+    m.run_id, l.node,
+    l.label AS callback,
+    m.objects, m.count, m.open,
     CASE WHEN
             2 * m.span_ns >= coalesce(
                 r.end_ns + least(0, $end_ns - r.end_ns) - greatest(r.start_ns, $start_ns), 0
             )
             THEN (m.count - 1) * 1e9 / nullif(m.span_ns, 0)
     END AS rate_hz,
-    m.period_min_ns, m.period_median_ns, m.period_max_ns, unnest(m.duration), m.total_ns,
+    m.period_min_ns, m.period_median_ns, m.period_max_ns,
+    unnest(m.duration),
+    m.total_ns,
     m.running[1] AS running_median_ns,
     m.running[2] AS running_p99_ns,
     m.preempted_p99_ns, m.preempted_ns, c.symbol, m.callback_id, l.is_internal

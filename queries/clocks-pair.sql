@@ -13,13 +13,17 @@
 -- column: shortest_message_ns, shortest_packet_ns
 -- brief: from_hosts, to_hosts, message_count, shortest_message_ns, packet_count, shortest_packet_ns
 WITH named AS (
-    SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts
+    SELECT
+        clock_id,
+        string_agg(hostname, ', ' ORDER BY host_id) AS hosts
     FROM main.host
     GROUP BY clock_id
 )
 SELECT
-    p.run_id, f.hosts AS from_hosts, t.hosts AS to_hosts, p.message_count, p.packet_count,
-    p.shortest_message_ns, p.shortest_packet_ns
+    p.run_id,
+    f.hosts AS from_hosts,
+    t.hosts AS to_hosts,
+    p.message_count, p.packet_count, p.shortest_message_ns, p.shortest_packet_ns
 FROM main.clock_pair AS p
 LEFT JOIN named AS f ON p.from_clock_id = f.clock_id
 LEFT JOIN named AS t ON p.to_clock_id = t.clock_id

@@ -24,7 +24,9 @@
 -- column: uuid VARCHAR                        UUID of the clock (LTTng: boot identity)
 -- brief: hosts, method, reference, offset_ns, uncertainty_ns, greatest_uncertainty_ns, drift_ppb
 WITH named AS (
-    SELECT clock_id, string_agg(hostname, ', ' ORDER BY host_id) AS hosts
+    SELECT
+        clock_id,
+        string_agg(hostname, ', ' ORDER BY host_id) AS hosts
     FROM main.host
     GROUP BY clock_id
 )
@@ -46,7 +48,9 @@ FROM main.clock AS c
 LEFT JOIN named AS n ON c.clock_id = n.clock_id
 LEFT JOIN named AS r ON c.reference_clock_id = r.clock_id
 LEFT JOIN (
-    SELECT clock_id, max(uncertainty_ns) AS greatest_ns
+    SELECT
+        clock_id,
+        max(uncertainty_ns) AS greatest_ns
     FROM main.clock_uncertainty
     GROUP BY clock_id
 ) AS k ON c.clock_id = k.clock_id

@@ -158,7 +158,9 @@ piece AS (
     LEFT JOIN (FROM main.thread WHERE $has_kernel) AS t ON c.state_thread_id = t.thread_id
     -- Where no callback is traced, the only node of the process that did it.
     LEFT JOIN (
-        SELECT process_id, any_value(full_name) AS node
+        SELECT
+            process_id,
+            any_value(full_name) AS node
         FROM main.node
         WHERE $has_kernel
         GROUP BY process_id
@@ -188,12 +190,17 @@ piece AS (
 -- The layers of one publication follow each other. States of a callback alternate.
 folded AS (
     SELECT
-        run_id, flow_rank, min(position) AS position, min(at_ns) AS at_ns,
-        sum(duration_ns)::BIGINT AS duration_ns, hop,
+        run_id, flow_rank,
+        min(position) AS position,
+        min(at_ns) AS at_ns,
+        sum(duration_ns)::BIGINT AS duration_ns,
+        hop,
         CASE WHEN is_layer THEN 'publish' ELSE part END AS part,
         CASE WHEN is_layer THEN 'publish' ELSE activity END AS activity,
-        node, what, is_certain, min(from_ns) AS from_ns, callback_instance_id, publication_id,
-        take_id, latency_ns, path_id, state, who, thread, wakers, priority, who_priority, is_layer,
+        node, what, is_certain,
+        min(from_ns) AS from_ns,
+        callback_instance_id, publication_id, take_id, latency_ns, path_id, state, who, thread,
+        wakers, priority, who_priority, is_layer,
         CASE WHEN NOT is_layer AND ($detail = 'full' OR state IS NULL) THEN position END AS alone,
         count(*) FILTER (WHERE NOT is_layer) AS pieces
     FROM piece
@@ -246,14 +253,18 @@ ordered AS (
 ),
 -- Flows in the order of their pieces.
 doubted AS (
-    SELECT dense_rank() OVER (ORDER BY latency_ns DESC, flow_id) AS flow_rank, is_ambiguous
+    SELECT
+        dense_rank() OVER (ORDER BY latency_ns DESC, flow_id) AS flow_rank,
+        is_ambiguous
     FROM critical_flow
 )
 SELECT
-    s.run_id, s.flow_rank AS rank, s.piece.at_ns, s.duration_ns, s.piece.hop, s.piece.part,
-    s.activity, s.state, s.piece.who, s.node, s.piece.what, s.share, s.pieces, s.piece.is_certain,
-    s.piece.thread, s.piece.wakers, s.piece.priority, s.piece.who_priority, s.piece.from_ns,
-    s.piece.callback_instance_id, s.piece.publication_id, s.take_id, s.latency_ns,
+    s.run_id,
+    s.flow_rank AS rank,
+    s.piece.at_ns, s.duration_ns, s.piece.hop, s.piece.part, s.activity, s.state, s.piece.who,
+    s.node, s.piece.what, s.share, s.pieces, s.piece.is_certain, s.piece.thread, s.piece.wakers,
+    s.piece.priority, s.piece.who_priority, s.piece.from_ns, s.piece.callback_instance_id,
+    s.piece.publication_id, s.take_id, s.latency_ns,
     -- The path of a flow of a thousand hops is long: only the first of its rows has it.
     CASE WHEN s.place = 1 THEN d.is_ambiguous END AS is_ambiguous,
     CASE

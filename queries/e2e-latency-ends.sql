@@ -55,9 +55,11 @@
 -- note: clocks
 WITH flow AS (
     SELECT
-        p.path, p.topics[1] AS first_topic, p.topics[-1] AS last_topic, e.run_id, e.root_kind,
-        e.root_id, e.root_ns, e.take_id, e.sink_ns, e.latency_ns, e.status, e.is_loss_affected,
-        e.is_ambiguous
+        p.path,
+        p.topics[1] AS first_topic,
+        p.topics[-1] AS last_topic,
+        e.run_id, e.root_kind, e.root_id, e.root_ns, e.take_id, e.sink_ns, e.latency_ns, e.status,
+        e.is_loss_affected, e.is_ambiguous
     FROM path_outcome AS e
     JOIN named_path AS p ON e.path_id = p.path_id
 ),
@@ -92,9 +94,12 @@ measured AS (
 ),
 ends AS (
     SELECT
-        run_id, topics[1] AS first_topic, topics[-1] AS last_topic,
+        run_id,
+        topics[1] AS first_topic,
+        topics[-1] AS last_topic,
         string_split(path, ' → ')[-1] AS node,
-        count(*) AS paths, bool_or(is_cut) AS is_cut
+        count(*) AS paths,
+        bool_or(is_cut) AS is_cut
     FROM named_path
     GROUP BY ALL
 )
@@ -131,7 +136,8 @@ SELECT
     m.newests.mean_ns AS newest_mean_ns,
     m.newests.p95_ns AS newest_p95_ns,
     m.newests.p99_ns AS newest_p99_ns,
-    m.newests.max_ns AS newest_max_ns, n.is_cut
+    m.newests.max_ns AS newest_max_ns,
+    n.is_cut
 FROM ends AS n
 LEFT JOIN measured AS m
     ON n.run_id = m.run_id

@@ -79,7 +79,8 @@ measured AS (
 SELECT
     p.run_id,
     coalesce(COLUMNS(['inputs', 'intervals', 'unanswered', 'loss_affected', 'ambiguous']), 0),
-    unnest(m.reaction), m.event_mean_ns, m.sink_event, p.is_cut, p.path
+    unnest(m.reaction),
+    m.event_mean_ns, m.sink_event, p.is_cut, p.path
 FROM named_path AS p
 LEFT JOIN measured AS m ON p.path_id = m.path_id
 ORDER BY p.run_id, p.path, p.path_id

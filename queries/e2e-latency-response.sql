@@ -36,7 +36,8 @@ WITH cycle AS (
 ),
 response AS (
     SELECT
-        path_id, sink_event, is_ambiguous, newest_ns AS input_ns,
+        path_id, sink_event, is_ambiguous,
+        newest_ns AS input_ns,
         unnest([
             {response: 'best', response_ns: answer_ns - newest_ns},
             {response: 'worst', response_ns: answer_ns - oldest_ns},
@@ -49,7 +50,9 @@ response AS (
         ], recursive := true)
     FROM cycle
     UNION ALL
-    SELECT a.path_id, a.sink_event, a.is_ambiguous, a.root_ns, 'all', a.answer_ns - a.root_ns
+    SELECT
+        a.path_id, a.sink_event, a.is_ambiguous, a.root_ns, 'all',
+        a.answer_ns - a.root_ns
     FROM answered_input AS a
     JOIN cycle AS c ON a.path_id = c.path_id AND a.answer_ns = c.answer_ns
 ),
@@ -65,7 +68,9 @@ measured AS (
     GROUP BY path_id, response
 )
 SELECT
-    p.run_id, m.response, m.count, m.ambiguous, unnest(m.spread), m.sink_event, p.is_cut, p.path
+    p.run_id, m.response, m.count, m.ambiguous,
+    unnest(m.spread),
+    m.sink_event, p.is_cut, p.path
 FROM named_path AS p
 JOIN measured AS m ON p.path_id = m.path_id
 ORDER BY p.run_id, p.path, p.path_id, m.response

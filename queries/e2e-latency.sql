@@ -62,7 +62,9 @@ FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
 -- when: named_path WHERE subscription_id IN (FROM main.continued_subscription($runs))
 -- columns: path_id BIGINT, number BIGINT
 CREATE OR REPLACE TEMP TABLE looped_path AS
-SELECT path_id, count(*) AS number
+SELECT
+    path_id,
+    count(*) AS number
 FROM main.looped_arrival(
     $runs,
     (

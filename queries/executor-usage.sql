@@ -55,7 +55,9 @@ WITH member AS (
     WHERE list_contains($runs, x.run_id)
 ),
 broken AS (
-    SELECT thread_id, max(resumed_ns) AS resumed_ns
+    SELECT
+        thread_id,
+        max(resumed_ns) AS resumed_ns
     FROM main.thread_break
     WHERE list_contains($runs, run_id)
     GROUP BY thread_id
@@ -98,13 +100,20 @@ summed AS (
     GROUP BY thread_id
 ),
 callback AS (
-    SELECT thread_id, count(*) AS callbacks
+    SELECT
+        thread_id,
+        count(*) AS callbacks
     FROM main.callback_instance
     WHERE list_contains($runs, run_id) AND start_ns >= $start_ns AND start_ns < $end_ns
     GROUP BY thread_id
 )
 SELECT
-    m.run_id, m.hostname AS host, m.nodes, m.name AS process, m.pid, m.tid, m.kind AS executor_kind,
+    m.run_id,
+    m.hostname AS host,
+    m.nodes,
+    m.name AS process,
+    m.pid, m.tid,
+    m.kind AS executor_kind,
     greatest(m.last_ns - m.first_ns, 0) AS seen_ns,
     CASE WHEN m.has_states OR m.kind = 'events' THEN coalesce(s.wait_ns, 0) END AS wait_ns,
     CASE WHEN m.has_states THEN coalesce(s.select_ns, 0) ELSE nullif(s.select_ns, 0) END

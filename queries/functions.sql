@@ -41,7 +41,9 @@ WHERE coalesce($from, $to, $via, $without) IS NOT NULL
     );
 
 CREATE OR REPLACE TEMP TABLE function_flow AS
-SELECT *, row_number() OVER (ORDER BY latency_ns DESC, flow_id) AS place
+SELECT
+    *,
+    row_number() OVER (ORDER BY latency_ns DESC, flow_id) AS place
 FROM main.chosen_flow('function_outcome', most_flows := $slowest);
 
 CREATE OR REPLACE TEMP TABLE function_trail AS
@@ -49,7 +51,9 @@ FROM main.end_to_end_trail('function_flow', $runs, chains := 'function_chain');
 
 -- The place counts from the slowest flow that it is on the way of, or the longest instance.
 CREATE OR REPLACE TEMP TABLE function_instance AS
-SELECT p.callback_instance_id, min(f.place) AS place
+SELECT
+    p.callback_instance_id,
+    min(f.place) AS place
 FROM main.end_to_end_piece('function_flow', 'function_trail', $runs) AS p
 JOIN function_flow AS f ON p.flow_id = f.flow_id
 WHERE p.part IN ('callback', 'service')
@@ -68,15 +72,25 @@ WHERE coalesce($from, $to, $via, $without) IS NULL AND list_contains($runs, i.ru
 QUALIFY $slowest IS NULL OR place <= $slowest;
 
 WITH instance AS (
-    SELECT i.callback_instance_id, k.alike_id AS callback_id
+    SELECT
+        i.callback_instance_id,
+        k.alike_id AS callback_id
     FROM function_instance AS f
     JOIN main.callback_instance AS i ON f.callback_instance_id = i.callback_instance_id
     JOIN main.callback_alike AS k ON i.callback_id = k.callback_id
 ),
-counted AS (SELECT callback_id AS group_id, count(*) AS calls FROM instance GROUP BY callback_id),
+counted AS (
+    SELECT
+        callback_id AS group_id,
+        count(*) AS calls
+    FROM instance
+    GROUP BY callback_id
+),
 -- Outside of callbacks, a group is a process: the negative of its id.
 sample AS (
-    SELECT coalesce(i.callback_id, -s.process_id) AS group_id, s.stack_id, s.cpu_ns
+    SELECT
+        coalesce(i.callback_id, -s.process_id) AS group_id,
+        s.stack_id, s.cpu_ns
     FROM main.stack_sample AS s
     LEFT JOIN instance AS i ON s.callback_instance_id = i.callback_instance_id
     WHERE list_contains($runs, s.run_id)
@@ -89,7 +103,9 @@ sample AS (
 found AS (FROM main.function_time('sample')),
 -- Those with most samples come first.
 placed AS (
-    SELECT group_id, row_number() OVER (ORDER BY sum(self_samples) DESC, group_id) AS place
+    SELECT
+        group_id,
+        row_number() OVER (ORDER BY sum(self_samples) DESC, group_id) AS place
     FROM found
     GROUP BY group_id
 )
@@ -99,7 +115,8 @@ SELECT
     coalesce(l.label, 'outside of callbacks') AS callback,
     f.function, t.self_share, t.total_share, t.self_ns, t.total_ns,
     t.total_ns // c.calls AS per_call_ns,
-    c.calls, t.self_samples, t.samples, f.file, l.callback_id AS callback_id,
+    c.calls, t.self_samples, t.samples, f.file,
+    l.callback_id AS callback_id,
     coalesce(l.is_internal, false) AS is_internal
 FROM found AS t
 JOIN placed AS g ON t.group_id = g.group_id

@@ -26,7 +26,9 @@
 -- brief: kind, node, name, rate_hz, median_ns, p95_ns, count, indirect, executor
 -- note: clocks
 WITH indirect AS (
-    SELECT b.publisher_id, string_agg(DISTINCT l.kind, ', ' ORDER BY l.kind) AS kinds
+    SELECT
+        b.publisher_id,
+        string_agg(DISTINCT l.kind, ', ' ORDER BY l.kind) AS kinds
     FROM main.link_causal AS l
     JOIN main.publication AS b ON l.publication_id = b.publication_id
     WHERE list_contains($runs, l.run_id)
@@ -34,15 +36,23 @@ WITH indirect AS (
     GROUP BY b.publisher_id
 ),
 answer AS (
-    SELECT request_id, min(taken_ns) AS taken_ns
+    SELECT
+        request_id,
+        min(taken_ns) AS taken_ns
     FROM main.response
     WHERE list_contains($runs, run_id) AND request_id IS NOT NULL
     GROUP BY request_id
 ),
 event AS (
     SELECT
-        b.run_id, 'publish' AS kind, p.node_id, p.process_id, p.topic_name AS name,
-        p.is_internal, b.start_ns AS at_ns, NULL::BIGINT AS latency_ns, i.kinds
+        b.run_id,
+        'publish' AS kind,
+        p.node_id, p.process_id,
+        p.topic_name AS name,
+        p.is_internal,
+        b.start_ns AS at_ns,
+        NULL::BIGINT AS latency_ns,
+        i.kinds
     FROM main.publication AS b
     JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
     LEFT JOIN indirect AS i ON b.publisher_id = i.publisher_id
@@ -57,7 +67,9 @@ event AS (
     UNION ALL
     SELECT
         q.run_id, 'call', c.node_id, c.process_id, c.service_name, c.is_internal,
-        coalesce(q.sent_ns, q.taken_ns), r.taken_ns - q.sent_ns, NULL
+        coalesce(q.sent_ns, q.taken_ns),
+        r.taken_ns - q.sent_ns,
+        NULL
     FROM main.request AS q
     JOIN main.client AS c ON q.client_id = c.client_id
     LEFT JOIN answer AS r ON q.request_id = r.request_id
@@ -65,20 +77,23 @@ event AS (
     UNION ALL
     SELECT
         q.run_id, 'serve', s.node_id, s.process_id, s.service_name, s.is_internal,
-        coalesce(q.sent_ns, q.taken_ns), NULL, NULL
+        coalesce(q.sent_ns, q.taken_ns),
+        NULL, NULL
     FROM main.request AS q
     JOIN main.service AS s ON q.service_id = s.service_id
     WHERE NOT coalesce(contains(s.service_name, '/_action/'), false)
     UNION ALL
     SELECT
         g.run_id, 'send', c.node_id, c.process_id, g.action_name, c.is_internal,
-        coalesce(g.sent_ns, g.taken_ns), g.latency_ns, NULL
+        coalesce(g.sent_ns, g.taken_ns),
+        g.latency_ns, NULL
     FROM main.goal AS g
     JOIN main.client AS c ON g.action_client_id = c.client_id
     UNION ALL
     SELECT
         g.run_id, 'execute', s.node_id, s.process_id, g.action_name, s.is_internal,
-        coalesce(g.sent_ns, g.taken_ns), NULL, NULL
+        coalesce(g.sent_ns, g.taken_ns),
+        NULL, NULL
     FROM main.goal AS g
     JOIN main.service AS s ON g.action_server_id = s.service_id
 ),
@@ -100,7 +115,9 @@ edge AS (
 ),
 -- Nodes whose callbacks one executor ran.
 home AS (
-    SELECT i.run_id, l.node, min(x.executor_id) AS executor_id
+    SELECT
+        i.run_id, l.node,
+        min(x.executor_id) AS executor_id
     FROM (
         SELECT DISTINCT run_id, callback_id, thread_id
         FROM main.callback_instance
@@ -129,7 +146,8 @@ SELECT
     e.run_id, e.kind, e.node, e.name, e.indirect, e.count, e.rate_hz,
     e.quantiles[1] AS median_ns,
     e.quantiles[2] AS p95_ns,
-    x.label AS executor, h.executor_id, e.is_internal
+    x.label AS executor,
+    h.executor_id, e.is_internal
 FROM edge AS e
 LEFT JOIN home AS h ON e.run_id = h.run_id AND e.node = h.node
 LEFT JOIN executor AS x ON h.executor_id = x.executor_id

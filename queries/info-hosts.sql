@@ -11,7 +11,8 @@ SELECT
     host.run_id, host.hostname,
     (SELECT count(*) FROM main.trace WHERE trace.host_id = host.host_id) AS trace_count,
     (SELECT count(*) FROM main.process WHERE process.host_id = host.host_id) AS process_count,
-    clock.method AS clock_method, clock.uncertainty_ns AS clock_uncertainty_ns
+    clock.method AS clock_method,
+    clock.uncertainty_ns AS clock_uncertainty_ns
 FROM main.host
 JOIN main.clock ON clock.clock_id = host.clock_id
 WHERE list_contains($runs, host.run_id)

@@ -17,7 +17,10 @@
 -- brief: node, process_name, publisher_count, subscription_count, timer_count, service_count,
 --     client_count, action_server_count, action_client_count, pid
 SELECT
-    n.run_id, n.full_name AS node, p.name AS process_name, p.pid,
+    n.run_id,
+    n.full_name AS node,
+    p.name AS process_name,
+    p.pid,
     (SELECT count(*) FROM main.publisher WHERE node_id = n.node_id AND NOT is_internal)
         AS publisher_count,
     (SELECT count(*) FROM main.subscription WHERE node_id = n.node_id AND NOT is_internal)

@@ -14,7 +14,8 @@
 -- brief: process_name, pid, hostname, node_count, thread_count, duration_ns, tracetools_version,
 --     python_version, first_seen_ns
 SELECT
-    process.run_id, host.hostname, process.pid, process.name AS process_name,
+    process.run_id, host.hostname, process.pid,
+    process.name AS process_name,
     process.tracetools_version, process.python_version,
     (SELECT count(*) FROM main.node WHERE node.process_id = process.process_id) AS node_count,
     (SELECT count(*) FROM main.thread WHERE thread.process_id = process.process_id) AS thread_count,

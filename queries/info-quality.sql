@@ -26,7 +26,8 @@ WITH gap_edge AS (
 ),
 gap AS (
     SELECT
-        run_id, trace_id, count(*) AS gap_count,
+        run_id, trace_id,
+        count(*) AS gap_count,
         sum(greatest(end_ns - greatest(start_ns, coalesce(covered_until_ns, start_ns)), 0))::BIGINT
             AS gap_ns
     FROM gap_edge
@@ -39,27 +40,41 @@ object AS (
     UNION ALL
     SELECT process_id, is_inferred FROM main.subscription WHERE NOT is_internal
     UNION ALL
-    SELECT process_id, kind = 'unknown' FROM main.callback
+    SELECT
+        process_id,
+        kind = 'unknown'
+    FROM main.callback
 ),
 by_process AS (
     SELECT
-        process_id, 'open_callbacks' AS measure,
-        count_if(end_ns IS NULL) AS affected, count(*) AS total
+        process_id,
+        'open_callbacks' AS measure,
+        count_if(end_ns IS NULL) AS affected,
+        count(*) AS total
     FROM main.callback_instance
     GROUP BY process_id
     UNION ALL
-    SELECT process_id, 'loss_affected_callbacks', count_if(is_loss_affected), count(*)
+    SELECT
+        process_id, 'loss_affected_callbacks',
+        count_if(is_loss_affected),
+        count(*)
     FROM main.callback_instance
     GROUP BY process_id
     UNION ALL
-    SELECT process_id, 'placeholders', count_if(is_inferred), count(*)
+    SELECT
+        process_id, 'placeholders',
+        count_if(is_inferred),
+        count(*)
     FROM object
     GROUP BY process_id
 ),
 by_topic AS (
     SELECT
-        t.run_id, s.topic_name, 'orphan_takes' AS measure,
-        count(o.take_id) AS affected, count(*) AS total, bool_or(s.is_internal) AS is_internal
+        t.run_id, s.topic_name,
+        'orphan_takes' AS measure,
+        count(o.take_id) AS affected,
+        count(*) AS total,
+        bool_or(s.is_internal) AS is_internal
     FROM main.take AS t
     LEFT JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
     LEFT JOIN main.stat_orphan AS o ON t.take_id = o.take_id
@@ -67,34 +82,48 @@ by_topic AS (
     UNION ALL
     SELECT
         d.run_id, s.topic_name, 'unknown_deliveries',
-        count_if(d.status = 'unknown'), count(*), bool_or(s.is_internal)
+        count_if(d.status = 'unknown'),
+        count(*),
+        bool_or(s.is_internal)
     FROM main.stat_delivery AS d
     JOIN main.subscription AS s ON d.subscription_id = s.subscription_id
     GROUP BY d.run_id, s.topic_name
 ),
 by_run AS (
-    SELECT run_id, 'loss_affected_transport_links' AS measure,
-        count_if(is_loss_affected) AS affected, count(*) AS total
+    SELECT
+        run_id,
+        'loss_affected_transport_links' AS measure,
+        count_if(is_loss_affected) AS affected,
+        count(*) AS total
     FROM main.link_transport
     GROUP BY run_id
     UNION ALL
     SELECT
         run_id, 'ambiguous_transport_links',
-        count_if(coalesce(candidate_count > 1, false)), count(*)
+        count_if(coalesce(candidate_count > 1, false)),
+        count(*)
     FROM main.link_transport
     GROUP BY run_id
     UNION ALL
-    SELECT run_id, 'loss_affected_causal_links', count_if(is_loss_affected), count(*)
+    SELECT
+        run_id, 'loss_affected_causal_links',
+        count_if(is_loss_affected),
+        count(*)
     FROM main.link_causal
     GROUP BY run_id
     UNION ALL
-    SELECT run_id, measure, sum(affected), sum(total)
+    SELECT
+        run_id, measure,
+        sum(affected),
+        sum(total)
     FROM by_topic
     GROUP BY run_id, measure
 ),
 measured AS (
     SELECT
-        t.run_id, 1 AS position, 'trace' AS scope, t.path AS subject,
+        t.run_id, 1 AS position,
+        'trace' AS scope,
+        t.path AS subject,
         'discarded_events' AS measure,
         coalesce(t.discarded_event_count, 0) AS affected,
         t.event_count + coalesce(t.discarded_event_count, 0) AS total,
@@ -103,19 +132,24 @@ measured AS (
     UNION ALL
     SELECT
         t.run_id, 1, 'trace', t.path, 'gap_time',
-        coalesce(g.gap_ns, 0), t.end_ns - t.start_ns, false
+        coalesce(g.gap_ns, 0),
+        t.end_ns - t.start_ns,
+        false
     FROM main.trace AS t
     LEFT JOIN gap AS g ON t.trace_id = g.trace_id
     UNION ALL
     SELECT
-        p.run_id, 2, 'process', printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname),
+        p.run_id, 2, 'process',
+        printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname),
         b.measure, b.affected, b.total, false
     FROM by_process AS b
     JOIN main.process AS p ON b.process_id = p.process_id
     JOIN main.host AS h ON p.host_id = h.host_id
     UNION ALL
     SELECT
-        run_id, 3, 'topic', coalesce(topic_name, '?'), measure, affected, total,
+        run_id, 3, 'topic',
+        coalesce(topic_name, '?'),
+        measure, affected, total,
         coalesce(is_internal, false)
     FROM by_topic
     UNION ALL

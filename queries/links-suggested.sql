@@ -25,8 +25,11 @@
 -- brief: kind, node, inputs, outputs, evidence, doubt
 WITH named_node AS (
     SELECT
-        n.run_id, n.node_id, main.node_name(n.full_name) AS full_name, p.name AS process,
-        p.pid, h.hostname AS host,
+        n.run_id, n.node_id,
+        main.node_name(n.full_name) AS full_name,
+        p.name AS process,
+        p.pid,
+        h.hostname AS host,
         count(*) OVER (PARTITION BY n.run_id, main.node_name(n.full_name)) > 1 AS is_name_repeated
     FROM main.node AS n
     JOIN main.process AS p ON n.process_id = p.process_id
@@ -63,7 +66,10 @@ input AS (
 ),
 -- Messages lead nowhere, while timers or other messages lead to publications.
 dead_end AS MATERIALIZED (
-    SELECT *, timer_id IS NOT NULL AS is_timed, coalesce(timer_id, trigger_id) IS NULL AS is_outside
+    SELECT
+        *,
+        timer_id IS NOT NULL AS is_timed,
+        coalesce(timer_id, trigger_id) IS NULL AS is_outside
     FROM main.dead_end($runs)
 ),
 queued AS (
@@ -96,8 +102,10 @@ declared AS (
 -- Callbacks of subscriptions publish once per set of messages.
 fired AS (
     SELECT
-        c.publisher_id, c.topic_name AS output_topic, r.node_id, r.subscription_id,
-        r.callback_instance_id, r.start_ns, min(c.start_ns) AS published_ns
+        c.publisher_id,
+        c.topic_name AS output_topic,
+        r.node_id, r.subscription_id, r.callback_instance_id, r.start_ns,
+        min(c.start_ns) AS published_ns
     FROM caused AS c
     JOIN input_run AS r ON c.callback_instance_id = r.callback_instance_id
     ANTI JOIN declared AS d ON c.publisher_id = d.publisher_id
@@ -122,7 +130,9 @@ firing_input AS (
 -- A node that publishes as soon as it has a message of every input does so with the first one of
 -- the input that came last.
 patient AS (
-    SELECT f.publisher_id, count(*) AS patient_count
+    SELECT
+        f.publisher_id,
+        count(*) AS patient_count
     FROM firing AS f
     ASOF JOIN input_run AS r ON f.subscription_id = r.subscription_id AND f.start_ns > r.start_ns
     WHERE r.start_ns > f.emptied_ns
@@ -290,7 +300,9 @@ periodic AS (
 -- What may have been published by a timer that shows no event.
 doubtful AS (
     SELECT
-        p.node_id, p.publisher_id, s.topic_name AS input_topic, p.topic_name AS output_topic,
+        p.node_id, p.publisher_id,
+        s.topic_name AS input_topic,
+        p.topic_name AS output_topic,
         count(*) AS link_count,
         quantile_disc(l.wait_ns, [0.1, 0.9]) AS waits
     FROM main.link_causal AS l
@@ -323,7 +335,9 @@ independent AS (
         'if it does answer these messages, write direct instead' AS doubt
     FROM doubtful AS d
     JOIN (
-        SELECT publisher_id, count(*) AS publication_count
+        SELECT
+            publisher_id,
+            count(*) AS publication_count
         FROM main.publication
         WHERE list_contains($runs, run_id)
         GROUP BY publisher_id
@@ -340,13 +354,17 @@ kept_by_hand AS (
     FROM independent
 ),
 received AS (
-    SELECT node_id, list(DISTINCT topic_name ORDER BY topic_name) AS topics
+    SELECT
+        node_id,
+        list(DISTINCT topic_name ORDER BY topic_name) AS topics
     FROM input
     WHERE leading_count > 0
     GROUP BY node_id
 ),
 candidate AS (
-    SELECT *, kind IN ('partial_sync', 'approximate_sync') AS is_set
+    SELECT
+        *,
+        kind IN ('partial_sync', 'approximate_sync') AS is_set
     FROM (
         FROM periodic
         UNION ALL BY NAME FROM partial
@@ -356,7 +374,9 @@ candidate AS (
     )
 )
 SELECT
-    n.run_id, c.kind, n.full_name AS node, c.inputs, c.outputs, c.evidence,
+    n.run_id, c.kind,
+    n.full_name AS node,
+    c.inputs, c.outputs, c.evidence,
     nullif(
         concat_ws(
             '; ',

@@ -70,7 +70,8 @@ link AS (
 SELECT
     a.run_id, a.kind, a.source,
     main.node_label(n.full_name, p.name, p.pid) AS node,
-    i.topics AS inputs, o.topics AS outputs,
+    i.topics AS inputs,
+    o.topics AS outputs,
     coalesce(COLUMNS(['publications', 'complete', 'links', 'ambiguous']), 0),
     l.median_wait_ns, l.max_wait_ns, a.annotation_id
 FROM main.annotation AS a

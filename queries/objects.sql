@@ -26,8 +26,14 @@ WITH nameless_timer AS (
 ),
 object AS (
     SELECT
-        run_id, process_id, node_id, 'publisher' AS kind, topic_name AS name, queue_depth,
-        NULL::BIGINT AS goals, created_ns, publisher_id AS object_id, is_inferred, is_internal
+        run_id, process_id, node_id,
+        'publisher' AS kind,
+        topic_name AS name,
+        queue_depth,
+        NULL::BIGINT AS goals,
+        created_ns,
+        publisher_id AS object_id,
+        is_inferred, is_internal
     FROM main.publisher
     UNION ALL
     SELECT
@@ -36,14 +42,20 @@ object AS (
     FROM main.subscription
     UNION ALL
     SELECT
-        run_id, process_id, node_id, 'timer', printf('%.10g ms', period_ns / 1e6), NULL,
-        NULL, created_ns, timer_id, is_inferred, false
+        run_id, process_id, node_id, 'timer',
+        printf('%.10g ms', period_ns / 1e6),
+        NULL, NULL, created_ns, timer_id, is_inferred, false
     FROM main.timer
     ANTI JOIN nameless_timer USING (timer_id)
     UNION ALL
     SELECT
-        run_id, process_id, NULL, 'timer', printf('%d without node and callback', count(*)), NULL,
-        NULL, min(created_ns), min(timer_id), count(created_ns) = 0, false
+        run_id, process_id, NULL, 'timer',
+        printf('%d without node and callback', count(*)),
+        NULL, NULL,
+        min(created_ns),
+        min(timer_id),
+        count(created_ns) = 0,
+        false
     FROM nameless_timer
     GROUP BY run_id, process_id
     UNION ALL
@@ -79,8 +91,13 @@ symbol AS (
     GROUP BY ALL
 )
 SELECT
-    o.run_id, h.hostname AS host, p.name AS process, p.pid, n.full_name AS node, o.kind, o.name,
-    o.queue_depth, o.goals, o.created_ns, s.symbols, o.object_id, o.is_inferred, o.is_internal
+    o.run_id,
+    h.hostname AS host,
+    p.name AS process,
+    p.pid,
+    n.full_name AS node,
+    o.kind, o.name, o.queue_depth, o.goals, o.created_ns, s.symbols, o.object_id, o.is_inferred,
+    o.is_internal
 FROM object AS o
 JOIN main.process AS p ON o.process_id = p.process_id
 JOIN main.host AS h ON p.host_id = h.host_id

@@ -96,7 +96,9 @@ WITH piece AS (
 ),
 part AS (
     SELECT
-        path_id, flow_id, hop, rank, piece AS part, is_turning,
+        path_id, flow_id, hop, rank,
+        piece AS part,
+        is_turning,
         CASE piece
             WHEN 'network_or_idle' THEN duration_ns - greatest(busy_max_ns, busy_min_ns)
             WHEN 'undecided' THEN greatest(busy_max_ns - busy_min_ns, 0)
@@ -142,7 +144,9 @@ message AS (
     WHERE p.is_path
 ),
 doubted AS (
-    SELECT path_id, count(*) FILTER (WHERE is_ambiguous) AS flows
+    SELECT
+        path_id,
+        count(*) FILTER (WHERE is_ambiguous) AS flows
     FROM breakdown_flow
     GROUP BY path_id
 )
@@ -153,7 +157,9 @@ SELECT
         ELSE coalesce(l.node, main.node_label(n.full_name, r.name, r.pid))
     END AS node,
     coalesce(l.label, h.topic_name) AS what,
-    m.flows, d.flows AS ambiguous, m.overlaps,
+    m.flows,
+    d.flows AS ambiguous,
+    m.overlaps,
     m.quantiles[1] AS median_ns,
     m.mean_ns,
     m.quantiles[2] AS p95_ns,

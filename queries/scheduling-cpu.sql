@@ -26,14 +26,25 @@ WITH chosen AS (
     WHERE list_contains($runs, run_id) AND start_ns >= $start_ns AND start_ns < $end_ns
 ),
 traced AS (
-    SELECT run_id, host_id, max(length_ns) AS length_ns
-    FROM (SELECT run_id, host_id, cpu, sum(running_ns) AS length_ns FROM chosen GROUP BY ALL)
+    SELECT
+        run_id, host_id,
+        max(length_ns) AS length_ns
+    FROM (
+        SELECT
+            run_id, host_id, cpu,
+            sum(running_ns) AS length_ns
+        FROM chosen
+        GROUP BY ALL
+    )
     GROUP BY run_id, host_id
 ),
 second AS (
     SELECT
-        run_id, host_id, thread_id, CASE WHEN thread_id IS NULL THEN tid END AS other_tid,
-        name, start_ns, sum(running_ns) AS running_ns, list(DISTINCT cpu) AS cpus,
+        run_id, host_id, thread_id,
+        CASE WHEN thread_id IS NULL THEN tid END AS other_tid,
+        name, start_ns,
+        sum(running_ns) AS running_ns,
+        list(DISTINCT cpu) AS cpus,
         sum(running_ns) FILTER (WHERE frequency_hz IS NOT NULL) AS measured_ns,
         sum(running_ns * frequency_hz::DOUBLE) AS cycles
     FROM chosen
@@ -42,15 +53,21 @@ second AS (
 ),
 measured AS (
     SELECT
-        run_id, host_id, thread_id, other_tid, any_value(name) AS name,
-        sum(running_ns)::BIGINT AS running_ns, max(running_ns) / 1e9 AS most_share,
+        run_id, host_id, thread_id, other_tid,
+        any_value(name) AS name,
+        sum(running_ns)::BIGINT AS running_ns,
+        max(running_ns) / 1e9 AS most_share,
         len(list_distinct(flatten(list(cpus)))) AS cpus,
         sum(cycles) / sum(measured_ns) AS frequency_hz
     FROM second
     GROUP BY run_id, host_id, thread_id, other_tid
 )
 SELECT
-    m.run_id, h.hostname AS host, l.nodes, p.name AS process, p.pid,
+    m.run_id,
+    h.hostname AS host,
+    l.nodes,
+    p.name AS process,
+    p.pid,
     coalesce(t.name, m.name) AS thread,
     coalesce(t.tid, m.other_tid) AS tid,
     m.running_ns,

@@ -23,7 +23,8 @@
 -- note: kernel
 WITH lost AS (
     SELECT
-        run_id, thread_id, thread_priority AS priority,
+        run_id, thread_id,
+        thread_priority AS priority,
         preemptor_thread_id AS preempted_by_thread_id,
         preemptor_other_thread_id AS preempted_by_other_thread_id,
         preemptor_priority AS preempted_by_priority,
@@ -39,7 +40,10 @@ WITH lost AS (
     GROUP BY ALL
 )
 SELECT
-    l.run_id, pl.nodes, p.name AS process, t.name AS thread, t.tid, l.priority,
+    l.run_id, pl.nodes,
+    p.name AS process,
+    t.name AS thread,
+    t.tid, l.priority,
     coalesce(bl.label, o.name) AS preempted_by,
     coalesce(b.tid, o.tid) AS preempted_by_tid,
     l.preempted_by_priority,

@@ -49,9 +49,14 @@ measured AS (
     GROUP BY run_id, thread_id
 )
 SELECT
-    m.run_id, h.hostname AS host, l.nodes, p.name AS process, p.pid, t.name AS thread, t.tid,
-    m.running_ns, m.preempted_ns, m.runnable_ns, m.sleeping_ns, m.uninterruptible_ns, m.unknown_ns,
-    m.preemptions, m.priority, m.loss_affected, m.thread_id
+    m.run_id,
+    h.hostname AS host,
+    l.nodes,
+    p.name AS process,
+    p.pid,
+    t.name AS thread,
+    t.tid, m.running_ns, m.preempted_ns, m.runnable_ns, m.sleeping_ns, m.uninterruptible_ns,
+    m.unknown_ns, m.preemptions, m.priority, m.loss_affected, m.thread_id
 FROM measured AS m
 JOIN main.thread AS t ON m.thread_id = t.thread_id
 JOIN main.process AS p ON t.process_id = p.process_id

@@ -34,7 +34,9 @@ WITH waited AS (
 ),
 taken AS (
     SELECT
-        m.run_id, m.thread_id, m.thread_priority AS priority, coalesce(b.label, o.name) AS name,
+        m.run_id, m.thread_id,
+        m.thread_priority AS priority,
+        coalesce(b.label, o.name) AS name,
         sum(m.end_ns - m.start_ns) AS length_ns
     FROM main.preemptor AS m
     LEFT JOIN main.thread_label AS b ON m.preemptor_thread_id = b.thread_id
@@ -55,12 +57,19 @@ meanwhile AS (
     GROUP BY run_id, thread_id, priority
 )
 SELECT
-    w.run_id, h.hostname AS host, l.nodes, p.name AS process, t.name AS thread, t.tid, w.priority,
+    w.run_id,
+    h.hostname AS host,
+    l.nodes,
+    p.name AS process,
+    t.name AS thread,
+    t.tid, w.priority,
     w.thread_id IN (SELECT thread_id FROM main.executor_thread) AS is_executor,
     w.count,
     w.quantiles[1] AS median_ns,
     w.quantiles[2] AS p99_ns,
-    w.max_ns, w.total_ns, n.names AS meanwhile, w.thread_id
+    w.max_ns, w.total_ns,
+    n.names AS meanwhile,
+    w.thread_id
 FROM waited AS w
 JOIN main.thread AS t ON w.thread_id = t.thread_id
 JOIN main.process AS p ON t.process_id = p.process_id

@@ -51,7 +51,9 @@ WITH measured AS (
     GROUP BY i.run_id, i.callback_id
 )
 SELECT
-    m.run_id, l.node, l.label AS callback, m.count, m.median_ns, m.max_ns,
+    m.run_id, l.node,
+    l.label AS callback,
+    m.count, m.median_ns, m.max_ns,
     m.quantiles[1] AS running_median_ns,
     m.quantiles[2] AS running_p99_ns,
     m.running_max_ns, m.total_ns, m.running_ns, m.preempted_ns, m.runnable_ns, m.sleeping_ns,

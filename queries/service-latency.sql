@@ -37,14 +37,19 @@
 --     callback_median_ns, wait_median_ns, request_median_ns, response_median_ns, reply_median_ns
 -- note: requests
 WITH single_service AS (
-    SELECT run_id, service_name, min(service_id) AS service_id
+    SELECT
+        run_id, service_name,
+        min(service_id) AS service_id
     FROM main.service
     WHERE list_contains($runs, run_id)
     GROUP BY run_id, service_name
     HAVING count(*) = 1
 ),
 answer AS (
-    SELECT request_id, arg_min(sent_ns, response_id) AS sent_ns, min(taken_ns) AS taken_ns
+    SELECT
+        request_id,
+        arg_min(sent_ns, response_id) AS sent_ns,
+        min(taken_ns) AS taken_ns
     FROM main.response
     WHERE list_contains($runs, run_id) AND request_id IS NOT NULL
     GROUP BY request_id
@@ -98,12 +103,14 @@ SELECT
     main.node_label(cn.full_name, cp.name, cp.pid) AS client,
     m.requests, m.answered, m.not_taken, m.not_answered, m.not_received, m.negative,
     m.request_median_ns, m.wait_median_ns, m.callback_median_ns, m.reply_median_ns,
-    m.response_median_ns, m.round_trip.min_ns AS round_trip_min_ns,
+    m.response_median_ns,
+    m.round_trip.min_ns AS round_trip_min_ns,
     m.round_trip.median_ns AS round_trip_median_ns,
     m.round_trip.mean_ns AS round_trip_mean_ns,
     m.round_trip.p95_ns AS round_trip_p95_ns,
     m.round_trip.p99_ns AS round_trip_p99_ns,
-    m.round_trip.max_ns AS round_trip_max_ns, m.service_id, m.client_id,
+    m.round_trip.max_ns AS round_trip_max_ns,
+    m.service_id, m.client_id,
     coalesce(s.is_internal, c.is_internal, false) AS is_internal
 FROM measured AS m
 LEFT JOIN main.service AS s ON m.service_id = s.service_id

@@ -84,14 +84,18 @@ instance AS (
 late AS MATERIALIZED (
     SELECT
         i.callback_id, i.callback_instance_id, i.thread_id, i.start_ns,
-        w.wait_ns AS lateness_ns, w.busy_max_ns AS busy_ns, w.meanwhile_callback_ids,
-        w.meanwhile_ns, w.run_queue_ns + w.preempted_ns AS queue_ns
+        w.wait_ns AS lateness_ns,
+        w.busy_max_ns AS busy_ns,
+        w.meanwhile_callback_ids, w.meanwhile_ns,
+        w.run_queue_ns + w.preempted_ns AS queue_ns
     FROM instance AS i
     JOIN main.executor_wait_explained($runs) AS w ON i.callback_instance_id = w.callback_instance_id
     WHERE w.since = 'timer' AND NOT i.is_loss_affected
 ),
 usual AS (
-    SELECT callback_id, quantile_disc(interval_ns, 0.5) AS median_ns
+    SELECT
+        callback_id,
+        quantile_disc(interval_ns, 0.5) AS median_ns
     FROM instance
     WHERE NOT is_loss_affected
     GROUP BY callback_id
@@ -144,7 +148,10 @@ delayed AS (
     GROUP BY l.callback_id
 )
 SELECT
-    a.run_id, n.node, n.label AS callback, a.objects, a.period_ns, u.median_ns AS period_median_ns,
+    a.run_id, n.node,
+    n.label AS callback,
+    a.objects, a.period_ns,
+    u.median_ns AS period_median_ns,
     c.rate_hz,
     coalesce(c.count, 0) AS count,
     d.missed, k.bunched,
@@ -168,7 +175,8 @@ SELECT
             AND g.place[2] - g.place[1] <= a.period_ns // 10
             THEN 'reset'
     END AS off_grid,
-    d.busy_share, d.run_queue_share, m.shares AS meanwhile,
+    d.busy_share, d.run_queue_share,
+    m.shares AS meanwhile,
     coalesce(c.count - c.loss_affected - coalesce(d.known, 0), 0) AS unknown,
     coalesce(c.loss_affected, 0) AS loss_affected,
     a.symbol, a.timer_id, a.callback_id, n.is_internal

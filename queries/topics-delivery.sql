@@ -29,7 +29,8 @@
 -- next: query topics --measure unmatched --topic {topic_name} | query topics --measure unmatched
 WITH delivery AS (
     SELECT
-        d.subscription_id, count(*) AS published,
+        d.subscription_id,
+        count(*) AS published,
         count(*) FILTER (WHERE d.status = 'delivered') AS delivered,
         count(*) FILTER (WHERE d.status = 'dropped') AS dropped,
         count(*) FILTER (WHERE d.status = 'lost') AS lost,
@@ -44,7 +45,9 @@ WITH delivery AS (
 ),
 orphan AS (
     SELECT
-        o.subscription_id, count(*) AS orphans, main.word_counts(o.reason) AS orphan_reasons
+        o.subscription_id,
+        count(*) AS orphans,
+        main.word_counts(o.reason) AS orphan_reasons
     FROM main.stat_orphan AS o
     JOIN main.take AS t ON o.take_id = t.take_id
     WHERE list_contains($runs, o.run_id) AND t.taken_ns >= $start_ns AND t.taken_ns < $end_ns

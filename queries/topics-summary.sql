@@ -44,18 +44,23 @@ rate AS (
     GROUP BY run_id, topic_name
 ),
 deviation AS (
-    SELECT run_id, topic_name, round(stddev_samp(period_ns))::BIGINT AS deviation_ns
+    SELECT
+        run_id, topic_name,
+        round(stddev_samp(period_ns))::BIGINT AS deviation_ns
     FROM published
     GROUP BY run_id, topic_name, publisher_id
 ),
 jitter AS (
-    SELECT run_id, topic_name, max(deviation_ns) AS period_deviation_ns
+    SELECT
+        run_id, topic_name,
+        max(deviation_ns) AS period_deviation_ns
     FROM deviation
     GROUP BY run_id, topic_name
 ),
 delivery AS (
     SELECT
-        s.run_id, s.topic_name, histogram(d.status)::MAP(VARCHAR, BIGINT) AS number,
+        s.run_id, s.topic_name,
+        histogram(d.status)::MAP(VARCHAR, BIGINT) AS number,
         main.word_counts(d.reason) AS reasons
     FROM main.stat_delivery AS d
     JOIN main.publication AS b ON d.publication_id = b.publication_id
@@ -90,7 +95,8 @@ SELECT
     d.reasons,
     l.quantiles[1] AS latency_median_ns,
     l.quantiles[2] AS latency_p95_ns,
-    l.max_ns AS latency_max_ns, t.is_internal
+    l.max_ns AS latency_max_ns,
+    t.is_internal
 FROM main.topic AS t
 LEFT JOIN rate AS r ON t.run_id = r.run_id AND t.topic_name IS NOT DISTINCT FROM r.topic_name
 LEFT JOIN jitter AS j ON t.run_id = j.run_id AND t.topic_name IS NOT DISTINCT FROM j.topic_name

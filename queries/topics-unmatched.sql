@@ -24,9 +24,12 @@
 -- brief: at_ns, topic_name, side, status, reason, subscriber, publisher, publication_id, take_id
 WITH missing AS (
     SELECT
-        d.run_id, b.start_ns AS at_ns, 'publication' AS side, d.publisher_id, d.status, d.reason,
-        b.source_timestamp_ns, d.publication_id, NULL::BIGINT AS take_id, d.subscription_id,
-        s.process_id
+        d.run_id,
+        b.start_ns AS at_ns,
+        'publication' AS side,
+        d.publisher_id, d.status, d.reason, b.source_timestamp_ns, d.publication_id,
+        NULL::BIGINT AS take_id,
+        d.subscription_id, s.process_id
     FROM main.stat_delivery AS d
     JOIN main.publication AS b ON d.publication_id = b.publication_id
     JOIN main.subscription AS s ON d.subscription_id = s.subscription_id

@@ -74,7 +74,10 @@ meanwhile AS (
     GROUP BY p.callback_instance_id
 ),
 taken AS (
-    SELECT callback_instance_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns
+    SELECT
+        callback_instance_id,
+        unnest(cpu_taken_by) AS name,
+        unnest(cpu_taken_ns) AS length_ns
     FROM waited
 ),
 taker AS (
@@ -87,8 +90,9 @@ taker AS (
     GROUP BY callback_instance_id
 )
 SELECT
-    w.run_id, w.start_ns, l.node, l.label AS callback, w.since, w.wait_ns, w.busy_min_ns,
-    w.busy_max_ns, w.held_max_ns,
+    w.run_id, w.start_ns, l.node,
+    l.label AS callback,
+    w.since, w.wait_ns, w.busy_min_ns, w.busy_max_ns, w.held_max_ns,
     CASE
         WHEN w.wait_ns IS NULL OR w.busy_max_ns IS NULL THEN NULL
         WHEN 2 * (w.run_queue_ns + w.preempted_ns) > w.wait_ns THEN 'run queue'
@@ -100,9 +104,10 @@ SELECT
     END AS reason,
     w.wait_ns - w.busy_max_ns - coalesce(w.held_max_ns, 0) AS rest_min_ns,
     w.wait_ns - w.busy_min_ns AS rest_max_ns,
-    m.names AS meanwhile, w.until_arrival_ns, w.run_queue_ns, w.preempted_ns,
-    k.names AS cpu_taken_by, w.is_loss_affected, w.callback_instance_id, w.callback_id,
-    l.is_internal
+    m.names AS meanwhile,
+    w.until_arrival_ns, w.run_queue_ns, w.preempted_ns,
+    k.names AS cpu_taken_by,
+    w.is_loss_affected, w.callback_instance_id, w.callback_id, l.is_internal
 FROM waited AS w
 JOIN main.callback_label AS l ON w.callback_id = l.callback_id
 LEFT JOIN meanwhile AS m ON w.callback_instance_id = m.callback_instance_id

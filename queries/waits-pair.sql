@@ -46,7 +46,10 @@ WITH pair AS (
     WHERE start_ns >= $start_ns AND start_ns < $end_ns
 ),
 taken AS (
-    SELECT run_id, callback_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns
+    SELECT
+        run_id, callback_id,
+        unnest(cpu_taken_by) AS name,
+        unnest(cpu_taken_ns) AS length_ns
     FROM explained_wait
     WHERE start_ns >= $start_ns AND start_ns < $end_ns
 ),
@@ -64,13 +67,21 @@ measured AS (
     GROUP BY run_id, callback_id, meanwhile_callback_id
     UNION ALL
     SELECT
-        run_id, callback_id, NULL, name, count(*), NULL, sum(length_ns)::BIGINT,
-        sum(length_ns)::BIGINT, max(length_ns), NULL
+        run_id, callback_id, NULL, name,
+        count(*),
+        NULL,
+        sum(length_ns)::BIGINT,
+        sum(length_ns)::BIGINT,
+        max(length_ns),
+        NULL
     FROM taken
     GROUP BY run_id, callback_id, name
 )
 SELECT
-    m.run_id, l.node, l.label AS callback, o.node AS meanwhile_node, o.label AS meanwhile_callback,
+    m.run_id, l.node,
+    l.label AS callback,
+    o.node AS meanwhile_node,
+    o.label AS meanwhile_callback,
     m.meanwhile_thread, m.waits, m.instances, m.overlap_min_ns, m.overlap_max_ns, m.worst_ns,
     m.thread_max_ns,
     m.overlap_max_ns / sum(m.overlap_max_ns) OVER (PARTITION BY m.callback_id) AS share,

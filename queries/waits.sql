@@ -77,7 +77,11 @@ measured AS (
     GROUP BY run_id, callback_id
 ),
 taken AS (
-    SELECT callback_id, unnest(cpu_taken_by) AS name, unnest(cpu_taken_ns) AS length_ns FROM waited
+    SELECT
+        callback_id,
+        unnest(cpu_taken_by) AS name,
+        unnest(cpu_taken_ns) AS length_ns
+    FROM waited
 ),
 taker AS (
     SELECT
@@ -96,12 +100,16 @@ preemptor AS (
     GROUP BY callback_id
 )
 SELECT
-    m.run_id, l.node, l.label AS callback, m.count, m.delayed_min, m.delayed_max, m.wait_median_ns,
-    m.wait_max_ns, m.busy_worst_ns, m.busy_total_min_ns, m.busy_total_max_ns, m.held_total_max_ns,
-    m.rest_total_min_ns, m.rest_total_max_ns, w.shares AS meanwhile, m.arrived,
-    m.until_arrival_total_ns, m.run_queue_worst_ns, m.run_queue_total_ns, m.preempted_worst_ns,
-    m.preempted_total_ns, p.shares AS cpu_taken_by, m.unknown, m.loss_affected, m.callback_id,
-    l.is_internal
+    m.run_id, l.node,
+    l.label AS callback,
+    m.count, m.delayed_min, m.delayed_max, m.wait_median_ns, m.wait_max_ns, m.busy_worst_ns,
+    m.busy_total_min_ns, m.busy_total_max_ns, m.held_total_max_ns, m.rest_total_min_ns,
+    m.rest_total_max_ns,
+    w.shares AS meanwhile,
+    m.arrived, m.until_arrival_total_ns, m.run_queue_worst_ns, m.run_queue_total_ns,
+    m.preempted_worst_ns, m.preempted_total_ns,
+    p.shares AS cpu_taken_by,
+    m.unknown, m.loss_affected, m.callback_id, l.is_internal
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 LEFT JOIN main.meanwhile_share('waited') AS w ON m.callback_id = w.callback_id

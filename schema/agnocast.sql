@@ -8,7 +8,9 @@
 -- timer. What is not of the middleware has 0 in place of its handle there.
 
 CREATE TEMP TABLE agnocast_process AS
-SELECT thread_index, dense_rank() OVER (ORDER BY trace_index, pid_ns, vpid) AS process
+SELECT
+    thread_index,
+    dense_rank() OVER (ORDER BY trace_index, pid_ns, vpid) AS process
 FROM raw.thread;
 
 INSERT INTO raw.ros2_rcl_init BY NAME
@@ -43,7 +45,9 @@ FROM raw.agnocast_agnocast_subscription_init;
 CREATE TEMP TABLE agnocast_callback AS
 SELECT
     event_id, ts_ns, trace_index, cpu_id, thread_index, subscription_handle,
-    subscription_handle AS subscription, pid_callback_info_id AS callback, symbol,
+    subscription_handle AS subscription,
+    pid_callback_info_id AS callback,
+    symbol,
     callback_group AS callback_group_addr
 FROM raw.agnocast_agnocast_subscription_init
 WHERE pid_callback_info_id <> 0;
@@ -70,7 +74,9 @@ WITH due AS (
     JOIN agnocast_process AS p ON c.thread_index = p.thread_index
 ),
 usual AS (
-    SELECT process, timer_handle, quantile_disc(distance_ns, 0.5) AS distance_ns
+    SELECT
+        process, timer_handle,
+        quantile_disc(distance_ns, 0.5) AS distance_ns
     FROM due
     WHERE distance_ns > 0
     GROUP BY process, timer_handle
@@ -91,7 +97,9 @@ made AS (
 )
 SELECT
     event_id, ts_ns, trace_index, cpu_id, thread_index, timer_handle, node_handle,
-    timer_handle AS callback, symbol, callback_group AS callback_group_addr,
+    timer_handle AS callback,
+    symbol,
+    callback_group AS callback_group_addr,
     CASE
         WHEN is_in_ns THEN period
         WHEN power BETWEEN 0 AND 3 THEN period * [1, 1_000, 1_000_000, 1_000_000_000][power + 1]
@@ -120,7 +128,9 @@ SELECT event_id, ts_ns, trace_index, cpu_id, thread_index, callback, symbol FROM
 -- One whose making was not recorded is a callback of its own, by its address.
 CREATE TEMP TABLE agnocast_run AS
 WITH made AS (
-    SELECT c.event_id, p.process, c.callable, c.pid_callback_info_id AS callback
+    SELECT
+        c.event_id, p.process, c.callable,
+        c.pid_callback_info_id AS callback
     FROM raw.agnocast_agnocast_create_callable AS c
     JOIN agnocast_process AS p ON c.thread_index = p.thread_index
     UNION ALL
@@ -135,7 +145,9 @@ begun AS (
 ),
 latest AS (
     SELECT
-        b.*, m.event_id AS made_event_id, m.callback,
+        b.*,
+        m.event_id AS made_event_id,
+        m.callback,
         row_number() OVER (PARTITION BY m.event_id ORDER BY b.event_id) = 1 AS is_first
     FROM begun AS b
     ASOF LEFT JOIN made AS m
@@ -149,12 +161,16 @@ SELECT
 FROM latest;
 
 INSERT INTO raw.ros2_callback_start BY NAME
-SELECT * EXCLUDE (callable), 0 AS is_intra_process FROM agnocast_run;
+SELECT
+    * EXCLUDE (callable),
+    0 AS is_intra_process
+FROM agnocast_run;
 
 INSERT INTO raw.ros2_callback_end BY NAME
 SELECT
     e.event_id, e.ts_ns, e.trace_index, e.cpu_id, e.thread_index, e.previous_call_event_id,
-    e.previous_callback_event_id, coalesce(r.callback, e.callable) AS callback
+    e.previous_callback_event_id,
+    coalesce(r.callback, e.callable) AS callback
 FROM raw.agnocast_agnocast_callable_end AS e
 ASOF LEFT JOIN agnocast_run AS r
     ON e.thread_index = r.thread_index AND e.callable = r.callable AND e.event_id > r.event_id;

@@ -1,6 +1,8 @@
 -- Views, macros, tables, triggers and types of the current database, each with its definition as
 -- DuckDB prints it. Keys are left out: their place in the statement differs, and they hold no SQL.
-SELECT 'view ' || schema_name || '.' || view_name AS name, sql
+SELECT
+    'view ' || schema_name || '.' || view_name AS name,
+    sql
 FROM duckdb_views()
 WHERE NOT internal AND database_name = current_database()
     AND schema_name IN ('store', 'main', 'derive')
@@ -23,11 +25,15 @@ FROM duckdb_tables()
 WHERE database_name = current_database() AND schema_name IN ('store', 'main', 'derive')
     AND table_name <> 'alembic_version'
 UNION ALL
-SELECT 'trigger ' || schema_name || '.' || trigger_name, coalesce(sql, '')
+SELECT
+    'trigger ' || schema_name || '.' || trigger_name,
+    coalesce(sql, '')
 FROM duckdb_triggers()
 WHERE database_name = current_database()
 UNION ALL
-SELECT 'type ' || schema_name || '.' || type_name, ''
+SELECT
+    'type ' || schema_name || '.' || type_name,
+    ''
 FROM duckdb_types()
 WHERE NOT internal AND database_name = current_database()
     AND schema_name IN ('store', 'main', 'derive')

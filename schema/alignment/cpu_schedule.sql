@@ -5,7 +5,8 @@
 -- when: raw.sched_switch
 SELECT
     row_number() OVER (ORDER BY trace_index, cpu_id)::INTEGER AS number,
-    trace_index, cpu_id AS cpu,
+    trace_index,
+    cpu_id AS cpu,
     max(ts_ns) - min(ts_ns) AS length_ns,
     coalesce(sum(ts_ns - run_start_ns), 0)::BIGINT AS known_ns,
     min(run_start_ns) FILTER (WHERE run_start_ns < ts_ns) AS start_ns,

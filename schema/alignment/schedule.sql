@@ -11,17 +11,26 @@
 -- grain: one row per kernel trace with switches
 -- when: staging.schedule_candidate
 WITH thread AS (
-    SELECT thread_index, trace_index, coalesce(pid_ns, 0) AS pid_ns, vpid, vtid FROM raw.thread
+    SELECT
+        thread_index, trace_index,
+        coalesce(pid_ns, 0) AS pid_ns,
+        vpid, vtid
+    FROM raw.thread
 ),
 life AS (
-    SELECT t.thread_index, i.event_id AS from_event_id
+    SELECT
+        t.thread_index,
+        i.event_id AS from_event_id
     FROM raw.ros2_rcl_init AS i
     JOIN thread AS o ON i.thread_index = o.thread_index
     JOIN thread AS t ON o.trace_index = t.trace_index AND o.pid_ns = t.pid_ns AND o.vpid = t.vpid
 ),
 -- Few and narrow columns: all moments are sorted.
 lived AS (
-    SELECT m.candidate_number, m.thread_index, l.from_event_id AS life, m.tid, m.is_known, m.at_ns
+    SELECT
+        m.candidate_number, m.thread_index,
+        l.from_event_id AS life,
+        m.tid, m.is_known, m.at_ns
     FROM (
         SELECT
             candidate_number, thread_index, event_id, tid, at_ns,
@@ -41,7 +50,9 @@ moment AS (
     GROUP BY ALL
 ),
 ran AS (
-    SELECT m.*, (t.pid_ns, t.vpid, t.vtid) AS ids
+    SELECT
+        m.*,
+        (t.pid_ns, t.vpid, t.vtid) AS ids
     FROM moment AS m
     JOIN thread AS t ON m.thread_index = t.thread_index
 ),
@@ -49,7 +60,9 @@ ran AS (
 held AS (
     SELECT
         candidate_number, ids, life, tid,
-        sum(event_count) AS event_count, min(first_ns) AS first_ns, max(last_ns) AS last_ns
+        sum(event_count) AS event_count,
+        min(first_ns) AS first_ns,
+        max(last_ns) AS last_ns
     FROM ran
     WHERE tid <> 0
     GROUP BY ALL
@@ -71,7 +84,8 @@ owner AS (
 ),
 most AS (
     SELECT
-        r.candidate_number, sum(r.event_count) AS event_count,
+        r.candidate_number,
+        sum(r.event_count) AS event_count,
         coalesce(max(r.event_count) FILTER (WHERE o.tid IS NOT NULL), 0) AS agreeing_count,
         sum(r.unknown_count) AS unknown_count
     FROM ran AS r
@@ -85,7 +99,8 @@ most AS (
 agreement AS (
     SELECT
         candidate_number,
-        sum(event_count)::BIGINT AS event_count, sum(agreeing_count)::BIGINT AS agreeing_count,
+        sum(event_count)::BIGINT AS event_count,
+        sum(agreeing_count)::BIGINT AS agreeing_count,
         sum(unknown_count)::BIGINT AS unknown_count
     FROM most
     GROUP BY ALL

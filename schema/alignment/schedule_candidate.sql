@@ -4,13 +4,17 @@
 -- grain: one row per kernel trace, clock of a ROS process, and shift
 -- when: raw.sched_switch
 WITH kernel AS (
-    SELECT s.trace_index, s.clock_key, s.clock_origin_ns, count(w.cpu_id) > 0 AS has_cpus
+    SELECT
+        s.trace_index, s.clock_key, s.clock_origin_ns,
+        count(w.cpu_id) > 0 AS has_cpus
     FROM raw.sched_switch AS w
     JOIN staging.source AS s ON w.trace_index = s.trace_index
     GROUP BY ALL
 ),
 ros AS (
-    SELECT clock_key, min(clock_origin_ns) AS clock_origin_ns
+    SELECT
+        clock_key,
+        min(clock_origin_ns) AS clock_origin_ns
     FROM staging.source
     WHERE domain IS DISTINCT FROM 'kernel'
     GROUP BY clock_key

@@ -8,7 +8,9 @@ SELECT e.candidate_number, e.event_id, e.thread_index, e.at_ns, w.tid, w.contrad
 FROM (
     -- Few and narrow columns here and below: all events and all switches are sorted.
     SELECT
-        c.candidate_number, p.number AS cpu_number, v.event_id, v.thread_index,
+        c.candidate_number,
+        p.number AS cpu_number,
+        v.event_id, v.thread_index,
         v.ts_ns - c.shift_ns AS at_ns
     FROM staging.event AS v
     JOIN staging.source AS s ON v.trace_index = s.trace_index
@@ -17,7 +19,8 @@ FROM (
 ) AS e
 ASOF JOIN (
     SELECT
-        p.number AS cpu_number, w.ts_ns,
+        p.number AS cpu_number,
+        w.ts_ns,
         CASE WHEN w.switch_number > 0 THEN w.prev_tid END AS tid,
         CASE WHEN w.run_start_ns IS NULL THEN w.event_id END AS contradiction_id
     FROM raw.sched_switch AS w

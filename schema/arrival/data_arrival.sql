@@ -13,14 +13,19 @@
 -- columns: process_id BIGINT, waker_thread_id BIGINT, at_ns BIGINT
 CREATE OR REPLACE TEMP TABLE middleware_waking AS
 WITH receiver AS (
-    SELECT DISTINCT t.process_id, w.clock_key, w.waker_tid AS tid
+    SELECT DISTINCT
+        t.process_id, w.clock_key,
+        w.waker_tid AS tid
     FROM staging.thread_waking AS w
     JOIN staging.thread AS t ON w.thread_id = t.thread_id
     JOIN staging.executor_thread AS x ON t.thread_id = x.thread_id
     JOIN staging.executor AS e ON x.executor_id = e.executor_id
     WHERE e.kind = 'events' AND regexp_matches(w.waker_name, '^(dds\.|recv|dq\.)')
 )
-SELECT r.process_id, p.thread_id AS waker_thread_id, k.ts_ns + s.shift_ns AS at_ns
+SELECT
+    r.process_id,
+    p.thread_id AS waker_thread_id,
+    k.ts_ns + s.shift_ns AS at_ns
 FROM raw.sched_waking AS k
 JOIN staging.schedule AS s ON k.trace_index = s.trace_index
 JOIN receiver AS r ON s.clock_key = r.clock_key AND k.tid = r.tid
@@ -29,7 +34,10 @@ JOIN staging.thread_tid AS p ON staging.has_tid(p, s.clock_key, w.next_tid, k.ts
 WHERE s.is_joined AND k.interrupt IS NULL;
 
 WITH heard AS (
-    SELECT n.take_id, t.taken_ns - min(a.ts_ns) AS waited_ns, count(*) > 1 AS is_ambiguous
+    SELECT
+        n.take_id,
+        t.taken_ns - min(a.ts_ns) AS waited_ns,
+        count(*) > 1 AS is_ambiguous
     FROM staging.located('raw.ros2_caret_on_data_available') AS a
     JOIN staging.take_chain AS t
         ON a.process_id = t.process_id AND a.source_stamp = t.source_timestamp_ns
@@ -47,12 +55,18 @@ queued AS (
 )
 SELECT take_id, waited_ns, is_ambiguous FROM heard
 UNION ALL
-SELECT take_id, taken_ns - least(next_ns, taken_ns), false
+SELECT
+    take_id,
+    taken_ns - least(next_ns, taken_ns),
+    false
 FROM queued
 WHERE publishing_thread_id = thread_id
 UNION ALL
 -- The last one: before, it may wait for what the publishing thread still holds.
-SELECT m.take_id, m.taken_ns - max(w.at_ns), false
+SELECT
+    m.take_id,
+    m.taken_ns - max(w.at_ns),
+    false
 FROM queued AS m
 JOIN middleware_waking AS w
     ON m.process_id = w.process_id

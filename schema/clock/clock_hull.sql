@@ -46,7 +46,9 @@ relevant AS (
 thinned (round, clock_id, other_clock_id, sense, moment, bound) AS (
     SELECT 0, clock_id, other_clock_id, sense, moment, bound FROM relevant
     UNION ALL
-    SELECT round + 1, clock_id, other_clock_id, sense, moment, bound
+    SELECT
+        round + 1,
+        clock_id, other_clock_id, sense, moment, bound
     FROM (
         SELECT
             round, clock_id, other_clock_id, sense, moment, bound, is_above,

@@ -66,7 +66,9 @@ through AS (
     GROUP BY ALL
 ),
 longest AS (
-    SELECT clock_id, other_clock_id, arg_max(-sense * slope, duration) AS slope
+    SELECT
+        clock_id, other_clock_id,
+        arg_max(-sense * slope, duration) AS slope
     FROM (
         SELECT
             clock_id, other_clock_id, sense, slope, is_beyond,
@@ -79,7 +81,8 @@ longest AS (
     GROUP BY clock_id, other_clock_id
 )
 SELECT
-    n.clock_id, n.other_clock_id, n.moment, n.distance, n.distance >= 0 AS is_even,
+    n.clock_id, n.other_clock_id, n.moment, n.distance,
+    n.distance >= 0 AS is_even,
     s.lowest, s.highest,
     round(n.middle) AS middle,
     round(

@@ -35,7 +35,8 @@ limit_edge AS (
     WINDOW along AS (PARTITION BY clock_id, other_clock_id, sense ORDER BY moment)
     UNION ALL
     SELECT
-        c.clock_id, c.other_clock_id, c.sense, e.begin_moment - 1,
+        c.clock_id, c.other_clock_id, c.sense,
+        e.begin_moment - 1,
         arg_min(c.bound, c.moment)
         - any_value(c.steepest) * (min(c.moment) - e.begin_moment + 1),
         any_value(c.steepest)
@@ -75,10 +76,14 @@ apart AS (
     GROUP BY k.clock_id, k.other_clock_id, k.moment
 )
 -- The greater of the two has a corner where they are equal.
-SELECT clock_id, other_clock_id, moment, greatest(below, above) AS error FROM apart
+SELECT
+    clock_id, other_clock_id, moment,
+    greatest(below, above) AS error
+FROM apart
 UNION ALL
 SELECT
-    clock_id, other_clock_id, moment + share * (next_moment - moment),
+    clock_id, other_clock_id,
+    moment + share * (next_moment - moment),
     below + share * (next_below - below)
 FROM (
     SELECT

@@ -20,7 +20,8 @@ WITH corner AS MATERIALIZED (
 ),
 pair AS MATERIALIZED (
     SELECT
-        clock_id, other_clock_id, any_value(base_ns) AS base_ns,
+        clock_id, other_clock_id,
+        any_value(base_ns) AS base_ns,
         any_value(base_bound_ns) AS base_bound_ns,
         any_value(received_count) AS received_count,
         any_value(sent_count) AS sent_count,
@@ -45,14 +46,17 @@ edge AS MATERIALIZED (
     SELECT
         clock_id, other_clock_id, sense, -1,
         arg_min(bound, moment) - derive.clock_drift_limit() * (min(moment) + 1),
-        derive.clock_drift_limit(), true
+        derive.clock_drift_limit(),
+        true
     FROM corner
     GROUP BY clock_id, other_clock_id, sense
 ),
 line AS MATERIALIZED (FROM derive.clock_line('corner', 'edge')),
 -- How far the clocks can be from the line at any time, where no line is possible.
 miss AS (
-    SELECT clock_id, other_clock_id, ceil(max(abs(least_miss))) AS greatest_miss
+    SELECT
+        clock_id, other_clock_id,
+        ceil(max(abs(least_miss))) AS greatest_miss
     FROM (
         SELECT
             l.clock_id, l.other_clock_id,
@@ -74,7 +78,10 @@ miss AS (
     GROUP BY clock_id, other_clock_id
 ),
 recorded AS (
-    SELECT h.clock_id, min(t.start_ns) AS begin_ns, max(t.end_ns) AS end_ns
+    SELECT
+        h.clock_id,
+        min(t.start_ns) AS begin_ns,
+        max(t.end_ns) AS end_ns
     FROM store.host AS h
     JOIN store.trace AS t ON h.host_id = t.host_id
     WHERE h.run_id = only_run
@@ -100,17 +107,22 @@ bounded AS (
     SELECT clock_id, other_clock_id, moment, error
     FROM derive.clock_line_error('edge', 'line', 'extent')
     UNION ALL
-    SELECT m.clock_id, m.other_clock_id, unnest([e.begin_moment, e.end_moment]), m.greatest_miss
+    SELECT
+        m.clock_id, m.other_clock_id,
+        unnest([e.begin_moment, e.end_moment]),
+        m.greatest_miss
     FROM miss AS m
     JOIN extent AS e ON m.clock_id = e.clock_id AND m.other_clock_id = e.other_clock_id
 ),
 known AS (
     SELECT
-        clock_id, other_clock_id, max(uncertainty_ns) AS greatest_uncertainty_ns,
+        clock_id, other_clock_id,
+        max(uncertainty_ns) AS greatest_uncertainty_ns,
         list({'at_ns': at_ns, 'uncertainty_ns': uncertainty_ns} ORDER BY at_ns) AS bounds
     FROM (
         SELECT
-            b.clock_id, b.other_clock_id, p.base_ns + round(b.moment)::BIGINT AS at_ns,
+            b.clock_id, b.other_clock_id,
+            p.base_ns + round(b.moment)::BIGINT AS at_ns,
             ceil(max(b.error))::BIGINT AS uncertainty_ns
         FROM bounded AS b
         JOIN pair AS p ON b.clock_id = p.clock_id AND b.other_clock_id = p.other_clock_id

@@ -11,7 +11,9 @@ WITH bound AS (
     JOIN store.clock AS c ON u.clock_id = c.clock_id
 )
 SELECT
-    run_id, clock_id, at_ns AS from_ns, at_ns, uncertainty_ns,
+    run_id, clock_id,
+    at_ns AS from_ns,
+    at_ns, uncertainty_ns,
     coalesce(
         (lead(uncertainty_ns) OVER along - uncertainty_ns) / (lead(at_ns) OVER along - at_ns),
         fastest
@@ -19,6 +21,10 @@ SELECT
 FROM bound
 WINDOW along AS (PARTITION BY clock_id ORDER BY at_ns)
 UNION ALL
-SELECT run_id, clock_id, -9223372036854775808, min(at_ns), arg_min(uncertainty_ns, at_ns), -fastest
+SELECT
+    run_id, clock_id, -9223372036854775808,
+    min(at_ns),
+    arg_min(uncertainty_ns, at_ns),
+    -fastest
 FROM bound
 GROUP BY run_id, clock_id, fastest

@@ -4,7 +4,9 @@
 -- grain: one row per pair of clocks that exchange messages, and ten seconds
 WITH way AS (
     SELECT
-        l.run_id, fh.clock_id AS from_clock_id, th.clock_id AS to_clock_id,
+        l.run_id,
+        fh.clock_id AS from_clock_id,
+        th.clock_id AS to_clock_id,
         b.end_ns // 10_000_000_000 AS bucket,
         min(t.taken_ns - b.end_ns) AS shift_ns
     FROM store.link_transport AS l

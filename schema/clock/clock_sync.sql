@@ -7,10 +7,13 @@
 CREATE OR REPLACE MACRO derive.clock_sync(only_run) AS TABLE
 WITH RECURSIVE pair AS MATERIALIZED (
     SELECT
-        clock_id, other_clock_id, reference_ns, offset_ns, drift_ppb / 1e9 AS drift,
-        uncertainty_ns, coalesce(drift_uncertainty_ppb, 0) / 1e9 AS drift_uncertainty, is_even,
-        received_packet_count + sent_packet_count > 0 AS has_packets, greatest_uncertainty_ns,
-        bounds
+        clock_id, other_clock_id, reference_ns, offset_ns,
+        drift_ppb / 1e9 AS drift,
+        uncertainty_ns,
+        coalesce(drift_uncertainty_ppb, 0) / 1e9 AS drift_uncertainty,
+        is_even,
+        received_packet_count + sent_packet_count > 0 AS has_packets,
+        greatest_uncertainty_ns, bounds
     FROM derive.clock_pair(only_run)
     WHERE offset_ns IS NOT NULL
 ),
@@ -36,8 +39,15 @@ chain (
     drift_uncertainty, is_even, has_packets, greatest_uncertainty_ns
 ) USING KEY (root_id, clock_id) AS (
     SELECT
-        clock_id, clock_id, NULL::BIGINT, reference_ns, 0::BIGINT, 0::DOUBLE, 0::BIGINT,
-        0::DOUBLE, true, false, 0::BIGINT
+        clock_id, clock_id,
+        NULL::BIGINT,
+        reference_ns,
+        0::BIGINT,
+        0::DOUBLE,
+        0::BIGINT,
+        0::DOUBLE,
+        true, false,
+        0::BIGINT
     FROM store.clock
     WHERE run_id = only_run
     UNION
@@ -70,7 +80,8 @@ chain (
 sync AS MATERIALIZED (
     SELECT
         root_id, clock_id, next_clock_id, reference_ns, offset_ns, drift,
-        round(drift * 1e9) AS drift_ppb, uncertainty_ns, drift_uncertainty, is_even, has_packets
+        round(drift * 1e9) AS drift_ppb,
+        uncertainty_ns, drift_uncertainty, is_even, has_packets
     FROM chain
     QUALIFY row_number() OVER (PARTITION BY clock_id ORDER BY root_id) = 1
 ),
@@ -85,7 +96,9 @@ way (clock_id, via_id, next_clock_id) AS (
 ),
 -- The bounds of each step, at times of the clock that it begins with.
 step_bound AS (
-    SELECT p.clock_id, p.other_clock_id, b.at_ns, b.uncertainty_ns::DOUBLE AS uncertainty_ns
+    SELECT
+        p.clock_id, p.other_clock_id, b.at_ns,
+        b.uncertainty_ns::DOUBLE AS uncertainty_ns
     FROM pair AS p, unnest(p.bounds) AS bound (b)
     UNION ALL
     SELECT
@@ -151,7 +164,9 @@ summed AS (
     GROUP BY a.clock_id, a.at_ns
 )
 SELECT
-    s.clock_id, s.root_id AS reference_clock_id, s.reference_ns, s.offset_ns,
+    s.clock_id,
+    s.root_id AS reference_clock_id,
+    s.reference_ns, s.offset_ns,
     s.drift_ppb::BIGINT AS drift_ppb,
     s.uncertainty_ns,
     CASE WHEN s.is_even THEN ceil(

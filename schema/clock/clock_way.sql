@@ -18,8 +18,12 @@ thread_clock AS (
     JOIN derive.process_clock AS c ON t.process_id = c.process_id
 )
 SELECT
-    l.run_id, f.clock_id AS from_clock_id, o.clock_id AS to_clock_id, false AS is_packet,
-    b.end_ns AS sent_ns, t.taken_ns AS received_ns
+    l.run_id,
+    f.clock_id AS from_clock_id,
+    o.clock_id AS to_clock_id,
+    false AS is_packet,
+    b.end_ns AS sent_ns,
+    t.taken_ns AS received_ns
 FROM store.link_transport AS l
 JOIN store.publication AS b ON l.publication_id = b.publication_id
 JOIN store.take AS t ON l.take_id = t.take_id

@@ -4,12 +4,16 @@
 --     they may be inside of it.
 -- grain: one row per attempt outside of callbacks
 WITH tried AS (
-    SELECT DISTINCT thread_id, derive.tenth_of_second(failed_ns) AS tenth FROM store.failed_take
+    SELECT DISTINCT
+        thread_id,
+        derive.tenth_of_second(failed_ns) AS tenth
+    FROM store.failed_take
 ),
 -- The last one tells all of a tenth of a second without an attempt.
 begun AS (
     SELECT
-        c.run_id, c.thread_id, max(c.start_ns) AS start_ns,
+        c.run_id, c.thread_id,
+        max(c.start_ns) AS start_ns,
         arg_max_null(c.end_ns, c.start_ns) AS end_ns
     FROM store.callback_instance AS c
     LEFT JOIN tried AS t

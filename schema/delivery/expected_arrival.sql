@@ -7,7 +7,8 @@
 -- grain: one row per publication on a topic with a subscription, and clock of its subscriptions
 WITH audience AS (
     SELECT DISTINCT
-        s.run_id, derive.own_topic(s.topic_name, s.is_agnocast, c.clock_id) AS topic_name,
+        s.run_id,
+        derive.own_topic(s.topic_name, s.is_agnocast, c.clock_id) AS topic_name,
         c.clock_id
     FROM store.subscription AS s
     JOIN derive.process_clock AS c ON s.process_id = c.process_id
@@ -16,7 +17,9 @@ WITH audience AS (
 sent AS (
     SELECT
         b.run_id, b.publication_id, b.publisher_id, a.topic_name, b.intra_ns, b.end_ns,
-        b.source_timestamp_ns, f.clock_id AS from_clock_id, a.clock_id
+        b.source_timestamp_ns,
+        f.clock_id AS from_clock_id,
+        a.clock_id
     FROM store.publication AS b
     JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
     JOIN derive.process_clock AS f ON p.process_id = f.process_id
@@ -26,7 +29,8 @@ sent AS (
 )
 SELECT
     run_id, publication_id, publisher_id, topic_name, source_timestamp_ns, clock_id,
-    coalesce(intra_ns, end_ns) AS arrival_ns, true AS has_one_clock
+    coalesce(intra_ns, end_ns) AS arrival_ns,
+    true AS has_one_clock
 FROM sent
 WHERE from_clock_id = clock_id
 UNION ALL

@@ -17,7 +17,11 @@ WITH last_run AS (
 SELECT l.run_id, l.process_id, l.thread_id, l.callback_instance_id, l.callback_id, l.start_ns
 FROM last_run AS l
 LEFT JOIN (
-    SELECT thread_id, max(start_ns) AS start_ns FROM store.executor_state GROUP BY thread_id
+    SELECT
+        thread_id,
+        max(start_ns) AS start_ns
+    FROM store.executor_state
+    GROUP BY thread_id
 ) AS e ON l.thread_id = e.thread_id
 WHERE l.callback_instance_id IS NOT NULL
     AND coalesce(e.start_ns <= l.start_ns, true)

@@ -3,16 +3,28 @@
 --     first node was seen to be created before its first callback instance, any gap counts.
 -- grain: one row per process
 WITH loss AS (
-    SELECT r.recording_id, min(l.start_ns) AS start_ns
+    SELECT
+        r.recording_id,
+        min(l.start_ns) AS start_ns
     FROM store.gap AS l
     JOIN derive.recording AS r ON l.trace_id = r.trace_id
     WHERE l.kind <> 'pause'
     GROUP BY r.recording_id
 ),
 started AS (
-    SELECT process_id, min(start_ns) AS start_ns FROM store.callback_instance GROUP BY process_id
+    SELECT
+        process_id,
+        min(start_ns) AS start_ns
+    FROM store.callback_instance
+    GROUP BY process_id
 ),
-born AS (SELECT process_id, min(created_ns) AS created_ns FROM store.node GROUP BY process_id)
+born AS (
+    SELECT
+        process_id,
+        min(created_ns) AS created_ns
+    FROM store.node
+    GROUP BY process_id
+)
 SELECT DISTINCT p.run_id, p.process_id
 FROM derive.process_presence AS p
 JOIN loss AS l ON p.recording_id = l.recording_id

@@ -19,13 +19,17 @@ CREATE OR REPLACE MACRO derive.orphan_take(
 WITH orphan AS MATERIALIZED (
     SELECT
         t.take_id, t.subscription_id, t.process_id, t.method, t.taken_ns, t.is_loss_affected,
-        t.source_timestamp_ns AS stamp_ns, s.topic_name, s.created_ns
+        t.source_timestamp_ns AS stamp_ns,
+        s.topic_name, s.created_ns
     FROM derive.unlinked_take(only_run) AS u
     JOIN store.take AS t ON u.take_id = t.take_id
     LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
 ),
 presence AS MATERIALIZED (
-    SELECT process_id, min(begin_ns) AS begin_ns, min(recorded_from_ns) AS recorded_from_ns
+    SELECT
+        process_id,
+        min(begin_ns) AS begin_ns,
+        min(recorded_from_ns) AS recorded_from_ns
     FROM derive.process_presence
     WHERE run_id = only_run AND EXISTS (SELECT 1 FROM orphan)
     GROUP BY process_id
@@ -88,7 +92,8 @@ nameless AS (
 ),
 sending AS (
     SELECT
-        topic_name, process_id, min(coalesce(created_ns, 0)) AS created_ns,
+        topic_name, process_id,
+        min(coalesce(created_ns, 0)) AS created_ns,
         bool_or(
             publisher_id NOT IN (
                 SELECT publisher_id
@@ -116,7 +121,10 @@ incomplete AS (
 ),
 topic AS (SELECT DISTINCT topic_name FROM orphan WHERE topic_name IS NOT NULL),
 candidate AS (
-    SELECT topic_name, process_id, created_ns, true AS is_known, is_silent
+    SELECT
+        topic_name, process_id, created_ns,
+        true AS is_known,
+        is_silent
     FROM sending
     WHERE topic_name IS NOT NULL
     UNION ALL
@@ -127,7 +135,12 @@ candidate AS (
         SELECT (topic_name, process_id) FROM sending WHERE topic_name IS NOT NULL
     )
     UNION ALL
-    SELECT NULL, process_id, min(created_ns), true, false FROM sending GROUP BY process_id
+    SELECT
+        NULL, process_id,
+        min(created_ns),
+        true, false
+    FROM sending
+    GROUP BY process_id
 ),
 sender AS (
     SELECT
@@ -262,7 +275,9 @@ FROM orphan AS o
 LEFT JOIN judged AS j ON o.take_id = j.take_id
 LEFT JOIN kept AS k ON o.take_id = k.take_id
 LEFT JOIN (
-    SELECT topic_name, source_timestamp_ns, candidate_count IS NULL AS is_clock_set
+    SELECT
+        topic_name, source_timestamp_ns,
+        candidate_count IS NULL AS is_clock_set
     FROM store.nearest_message
     WHERE run_id = only_run AND publication_id IS NULL
 ) AS n ON o.topic_name = n.topic_name AND o.stamp_ns = n.source_timestamp_ns

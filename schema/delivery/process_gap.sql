@@ -23,15 +23,27 @@ pause AS MATERIALIZED (
 ),
 -- What the paused processes did, where there are any.
 moment AS (
-    SELECT process_id, start_ns AS at_ns FROM store.publication WHERE run_id = only_run
+    SELECT
+        process_id,
+        start_ns AS at_ns
+    FROM store.publication
+    WHERE run_id = only_run
     UNION ALL
-    SELECT process_id, end_ns FROM store.publication WHERE run_id = only_run
+    SELECT process_id, end_ns
+    FROM store.publication
+    WHERE run_id = only_run
     UNION ALL
-    SELECT process_id, taken_ns FROM store.take WHERE run_id = only_run
+    SELECT process_id, taken_ns
+    FROM store.take
+    WHERE run_id = only_run
     UNION ALL
-    SELECT process_id, start_ns FROM store.callback_instance WHERE run_id = only_run
+    SELECT process_id, start_ns
+    FROM store.callback_instance
+    WHERE run_id = only_run
     UNION ALL
-    SELECT process_id, end_ns FROM store.callback_instance WHERE run_id = only_run
+    SELECT process_id, end_ns
+    FROM store.callback_instance
+    WHERE run_id = only_run
     UNION ALL
     SELECT t.process_id, s.start_ns
     FROM store.executor_state AS s
@@ -70,7 +82,9 @@ gap AS (
     UNION ALL
     SELECT run_id, process_id, start_ns, end_ns FROM absence WHERE has_pauses
     UNION ALL
-    SELECT run_id, process_id, begin_ns, first_ns - 1
+    SELECT
+        run_id, process_id, begin_ns,
+        first_ns - 1
     FROM following
     WHERE previous_end_ns IS NULL AND NOT is_born
     UNION ALL

@@ -15,29 +15,41 @@ WITH recording AS (
     WINDOW chunks AS (PARTITION BY r.run_id, r.recording_id)
 ),
 lossy AS (
-    SELECT r.run_id, r.recording_id, min(l.start_ns) AS start_ns
+    SELECT
+        r.run_id, r.recording_id,
+        min(l.start_ns) AS start_ns
     FROM store.gap AS l
     JOIN recording AS r ON l.trace_id = r.trace_id
     WHERE l.kind <> 'pause'
     GROUP BY r.run_id, r.recording_id
 ),
 instance AS (
-    SELECT run_id, process_id, trace_id, min(start_ns) AS first_ns, max(end_ns) AS last_ns
+    SELECT
+        run_id, process_id, trace_id,
+        min(start_ns) AS first_ns,
+        max(end_ns) AS last_ns
     FROM store.publication
     GROUP BY run_id, process_id, trace_id
     UNION ALL
-    SELECT run_id, process_id, trace_id, min(taken_ns), max(taken_ns)
+    SELECT
+        run_id, process_id, trace_id,
+        min(taken_ns),
+        max(taken_ns)
     FROM store.take
     GROUP BY run_id, process_id, trace_id
     UNION ALL
-    SELECT run_id, process_id, trace_id, min(start_ns), max(greatest(start_ns, coalesce(end_ns, 0)))
+    SELECT
+        run_id, process_id, trace_id,
+        min(start_ns),
+        max(greatest(start_ns, coalesce(end_ns, 0)))
     FROM store.callback_instance
     GROUP BY run_id, process_id, trace_id
 ),
 stay AS (
     SELECT
         i.run_id, i.process_id, r.recording_id, r.begin_ns, r.end_ns,
-        min(i.first_ns) AS first_ns, max(i.last_ns) AS last_ns
+        min(i.first_ns) AS first_ns,
+        max(i.last_ns) AS last_ns
     FROM instance AS i
     JOIN recording AS r ON i.trace_id = r.trace_id
     GROUP BY i.run_id, i.process_id, r.recording_id, r.begin_ns, r.end_ns

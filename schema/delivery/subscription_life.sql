@@ -4,7 +4,13 @@
 --     as the one for what comes through the middleware, so that it is not known what it should
 --     have got.
 -- grain: one row per subscription with a handle
-WITH host_end AS (SELECT host_id, max(last_seen_ns) AS end_ns FROM store.process GROUP BY host_id),
+WITH host_end AS (
+    SELECT
+        host_id,
+        max(last_seen_ns) AS end_ns
+    FROM store.process
+    GROUP BY host_id
+),
 reader AS (
     SELECT
         r.subscription_id,
@@ -39,7 +45,8 @@ SELECT
     nullif(s.queue_depth, 0) AS queue_depth,
     s.created_ns,
     coalesce(r.last_seen_ns, p.last_seen_ns) AS last_seen_ns,
-    x.replaced_ns, e.end_ns AS host_end_ns,
+    x.replaced_ns,
+    e.end_ns AS host_end_ns,
     CASE WHEN r.thread_count = 1 THEN r.thread_id END AS only_thread_id,
     p.host_id IN (SELECT host_id FROM showing) AS shows_takes
 FROM store.subscription AS s

@@ -47,8 +47,9 @@ link AS (
 ),
 missing AS MATERIALIZED (
     SELECT
-        a.publication_id, a.publisher_id, s.subscription_id, a.topic_name, a.clock_id,
-        a.arrival_ns, a.has_one_clock, a.source_timestamp_ns IS NULL AS has_no_stamp
+        a.publication_id, a.publisher_id, s.subscription_id, a.topic_name, a.clock_id, a.arrival_ns,
+        a.has_one_clock,
+        a.source_timestamp_ns IS NULL AS has_no_stamp
     FROM arrival AS a
     JOIN life AS s ON a.topic_name = s.topic_name AND a.clock_id = s.clock_id
     ANTI JOIN link AS l
@@ -64,7 +65,9 @@ gap AS MATERIALIZED (
 delivered AS MATERIALIZED (
     SELECT l.subscription_id, l.publisher_id, l.publication_id, a.arrival_ns, t.taken_ns
     FROM (
-        SELECT publication_id, publisher_id, subscription_id, min(take_id) AS take_id
+        SELECT
+            publication_id, publisher_id, subscription_id,
+            min(take_id) AS take_id
         FROM link
         WHERE subscription_id IN (SELECT subscription_id FROM missing)
         GROUP BY publication_id, publisher_id, subscription_id
@@ -89,11 +92,15 @@ pace AS (
 -- In most recordings few messages are missing, and to order all others would be most of the work.
 -- Of a tenth of a second in which none is missing, the first arrival and the first take count.
 missing_tenth AS (
-    SELECT DISTINCT subscription_id, derive.tenth_of_second(arrival_ns) AS tenth FROM missing
+    SELECT DISTINCT
+        subscription_id,
+        derive.tenth_of_second(arrival_ns) AS tenth
+    FROM missing
 ),
 condensed AS MATERIALIZED (
     SELECT
-        d.subscription_id, d.publisher_id, min(d.arrival_ns) AS arrival_ns,
+        d.subscription_id, d.publisher_id,
+        min(d.arrival_ns) AS arrival_ns,
         min(d.taken_ns) AS taken_ns
     FROM delivered AS d
     LEFT JOIN missing_tenth AS m
@@ -119,14 +126,17 @@ later_of_any AS (
     FROM condensed
 ),
 earliest AS (
-    SELECT subscription_id, publisher_id, min(arrival_ns) AS arrival_ns
+    SELECT
+        subscription_id, publisher_id,
+        min(arrival_ns) AS arrival_ns
     FROM condensed
     GROUP BY subscription_id, publisher_id
 ),
 -- Takes that could be any message, and those that could be one without a stamp.
 unidentified AS (
     SELECT
-        t.take_id, t.subscription_id, t.taken_ns, t.source_timestamp_ns IS NULL AS has_no_stamp,
+        t.take_id, t.subscription_id, t.taken_ns,
+        t.source_timestamp_ns IS NULL AS has_no_stamp,
         t.method = 'ring_buffer' AS is_from_buffer
     FROM store.orphan_take AS o
     JOIN store.take AS t ON o.take_id = t.take_id
@@ -199,8 +209,11 @@ known AS (
         END AS least_arrival_ns,
         coalesce(c.longest_ns, derive.delivery_limit().longest_ns) AS longest_ns,
         coalesce(c.patience_ns, derive.delivery_limit().longest_ns) AS patience_ns,
-        c.usual_ns, p.taken_ns AS publisher_taken_ns, p.arrival_ns AS publisher_arrival_ns,
-        n.taken_ns AS any_taken_ns, n.arrival_ns AS next_arrival_ns,
+        c.usual_ns,
+        p.taken_ns AS publisher_taken_ns,
+        p.arrival_ns AS publisher_arrival_ns,
+        n.taken_ns AS any_taken_ns,
+        n.arrival_ns AS next_arrival_ns,
         e.arrival_ns > m.arrival_ns AS is_before_first,
         -- From when on publisher and subscription could know each other: they need not have before.
         greatest(
@@ -237,10 +250,18 @@ due AS MATERIALIZED (
         ) AS publisher_row_length
     FROM known
 ),
-due_tenth AS (SELECT DISTINCT subscription_id, derive.tenth_of_second(due_ns) AS tenth FROM due),
+due_tenth AS (
+    SELECT DISTINCT
+        subscription_id,
+        derive.tenth_of_second(due_ns) AS tenth
+    FROM due
+),
 -- Of a tenth in which no message is due, only the first wait can be the next one after any.
 condensed_wait AS (
-    SELECT w.subscription_id, min(w.end_ns) AS end_ns, arg_min(w.start_ns, w.end_ns) AS start_ns
+    SELECT
+        w.subscription_id,
+        min(w.end_ns) AS end_ns,
+        arg_min(w.start_ns, w.end_ns) AS start_ns
     FROM long_wait AS w
     LEFT JOIN due_tenth AS d
         ON w.subscription_id = d.subscription_id AND derive.tenth_of_second(w.end_ns) = d.tenth
@@ -297,7 +318,8 @@ bounded AS MATERIALIZED (
 -- gone. Of any other tenth of a second the number of messages is enough.
 wanted_tenth AS (
     SELECT DISTINCT
-        topic_name, clock_id, derive.tenth_of_second(unnest([arrival_ns, gone_ns])) AS tenth
+        topic_name, clock_id,
+        derive.tenth_of_second(unnest([arrival_ns, gone_ns])) AS tenth
     FROM bounded
 ),
 ordered AS MATERIALIZED (
@@ -350,9 +372,14 @@ facts AS (
     ) AS f
         ON b.subscription_id = f.subscription_id AND b.arrival_ns <= f.failed_ns
     ASOF LEFT JOIN (
-        SELECT subscription_id, taken_ns, false AS for_no_stamp FROM unidentified WHERE has_no_stamp
+        SELECT
+            subscription_id, taken_ns,
+            false AS for_no_stamp
+        FROM unidentified
+        WHERE has_no_stamp
         UNION ALL
-        SELECT subscription_id, taken_ns, true FROM unidentified
+        SELECT subscription_id, taken_ns, true
+        FROM unidentified
     ) AS u
         ON b.subscription_id = u.subscription_id
         AND b.has_no_stamp = u.for_no_stamp

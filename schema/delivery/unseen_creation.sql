@@ -3,22 +3,45 @@
 --     itself do not count: /rosout is published on handles never initialised.
 -- grain: one row per such process
 WITH object AS (
-    SELECT process_id, 'nodes' AS kind, is_inferred FROM store.node
+    SELECT
+        process_id,
+        'nodes' AS kind,
+        is_inferred
+    FROM store.node
     UNION ALL
-    SELECT process_id, 'publishers', is_inferred FROM store.publisher WHERE NOT is_internal
+    SELECT process_id, 'publishers', is_inferred
+    FROM store.publisher
+    WHERE NOT is_internal
     UNION ALL
-    SELECT process_id, 'subscriptions', is_inferred FROM store.subscription WHERE NOT is_internal
+    SELECT process_id, 'subscriptions', is_inferred
+    FROM store.subscription
+    WHERE NOT is_internal
     UNION ALL
-    SELECT process_id, 'timers', created_ns IS NULL FROM store.timer
+    SELECT
+        process_id, 'timers',
+        created_ns IS NULL
+    FROM store.timer
     UNION ALL
-    SELECT process_id, 'services', created_ns IS NULL FROM store.service
+    SELECT
+        process_id, 'services',
+        created_ns IS NULL
+    FROM store.service
     UNION ALL
-    SELECT process_id, 'clients', created_ns IS NULL FROM store.client
+    SELECT
+        process_id, 'clients',
+        created_ns IS NULL
+    FROM store.client
     UNION ALL
-    SELECT process_id, 'callbacks', created_ns IS NULL FROM store.callback
+    SELECT
+        process_id, 'callbacks',
+        created_ns IS NULL
+    FROM store.callback
 ),
 counted AS (
-    SELECT process_id, kind, sum(is_inferred::BIGINT)::BIGINT AS inferred, count(*) AS number
+    SELECT
+        process_id, kind,
+        sum(is_inferred::BIGINT)::BIGINT AS inferred,
+        count(*) AS number
     FROM object
     GROUP BY process_id, kind
 )

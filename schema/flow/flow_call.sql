@@ -17,9 +17,12 @@ WITH caller AS (
 ),
 published AS (
     SELECT
-        l.run_id, derive.vertex_key('callback_instance', l.callback_instance_id) AS called_key,
-        l.callback_instance_id, NULL::BIGINT AS taken_request_id,
-        NULL::BIGINT AS taken_response_id, l.publication_id, l.publisher_id, l.kind
+        l.run_id,
+        derive.vertex_key('callback_instance', l.callback_instance_id) AS called_key,
+        l.callback_instance_id,
+        NULL::BIGINT AS taken_request_id,
+        NULL::BIGINT AS taken_response_id,
+        l.publication_id, l.publisher_id, l.kind
     FROM derive.certain_cause AS l
     SEMI JOIN (
         SELECT callback_instance_id
@@ -29,8 +32,9 @@ published AS (
     WHERE l.run_id = only_run
     UNION ALL
     SELECT
-        run_id, derive.vertex_key(from_kind, from_id), NULL, taken_request_id, taken_response_id,
-        publication_id, publisher_id, 'take_adjacent'
+        run_id,
+        derive.vertex_key(from_kind, from_id),
+        NULL, taken_request_id, taken_response_id, publication_id, publisher_id, 'take_adjacent'
     FROM derive.certain_call
     WHERE run_id = only_run AND publication_id IS NOT NULL
 )

@@ -15,11 +15,15 @@ answer AS (
     FROM store.callback_instance
     WHERE request_id IS NOT NULL
     UNION ALL
-    SELECT DISTINCT run_id, taken_request_id, derive.vertex_key('request', taken_request_id)
+    SELECT DISTINCT
+        run_id, taken_request_id,
+        derive.vertex_key('request', taken_request_id)
     FROM derive.certain_call
     WHERE taken_request_id IS NOT NULL
     UNION ALL
-    SELECT r.run_id, r.request_id, derive.vertex_key('response', r.response_id)
+    SELECT
+        r.run_id, r.request_id,
+        derive.vertex_key('response', r.response_id)
     FROM store.response AS r
     SEMI JOIN derive.certain_call AS l ON r.response_id = l.taken_response_id
     WHERE r.request_id IS NOT NULL
@@ -33,7 +37,9 @@ called AS MATERIALIZED (
     LEFT JOIN store.request AS q ON a.request_id = q.request_id
 ),
 caller (run_id, called_key, caller_key, client_id, services) AS (
-    SELECT c.run_id, c.called_key, c.sender_key, c.client_id, [c.service_id]
+    SELECT
+        c.run_id, c.called_key, c.sender_key, c.client_id,
+        [c.service_id]
     FROM called AS c
     ANTI JOIN called AS d ON c.sender_key = d.called_key
     WHERE derive.vertex_kind(c.sender_key) = 'callback_instance'

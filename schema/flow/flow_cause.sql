@@ -7,7 +7,8 @@ FROM derive.certain_cause
 WHERE annotation_id IS NULL
 UNION ALL
 SELECT
-    run_id, callback_instance_id, take_id, publication_id, kind, max(candidate_count),
+    run_id, callback_instance_id, take_id, publication_id, kind,
+    max(candidate_count),
     bool_or(is_loss_affected)
 FROM derive.certain_cause
 WHERE annotation_id IS NOT NULL

@@ -5,7 +5,8 @@
 -- grain: one row per take, publication that it led to, and way it did so
 SELECT
     l.run_id, l.take_id, l.subscription_id, l.publication_id, l.publisher_id, l.kind,
-    []::BIGINT[] AS route, coalesce(l.candidate_count > 1, false) AS is_ambiguous
+    []::BIGINT[] AS route,
+    coalesce(l.candidate_count > 1, false) AS is_ambiguous
 FROM derive.certain_cause AS l
 JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
 WHERE l.take_id IS NOT NULL AND NOT p.is_internal

@@ -9,14 +9,19 @@ WITH carried AS (
 ),
 entered AS (
     SELECT
-        run_id, subscription_id AS from_subscription_id, route, publisher_id,
+        run_id,
+        subscription_id AS from_subscription_id,
+        route, publisher_id,
         false AS is_source,
         bool_or(derive.is_indirect(kind)) AS is_cached
     FROM derive.flow_continuation
     WHERE run_id = only_run
     GROUP BY run_id, subscription_id, route, publisher_id
     UNION ALL
-    SELECT run_id, NULL, route, publisher_id, bool_or(is_source), false
+    SELECT
+        run_id, NULL, route, publisher_id,
+        bool_or(is_source),
+        false
     FROM store.flow_root
     WHERE run_id = only_run
     GROUP BY run_id, route, publisher_id

@@ -6,8 +6,10 @@
 -- grain: one row per cause, effect and kind of link
 SELECT
     run_id,
-    'publication' AS from_kind, publication_id AS from_id,
-    'take' AS to_kind, take_id AS to_id,
+    'publication' AS from_kind,
+    publication_id AS from_id,
+    'take' AS to_kind,
+    take_id AS to_id,
     'transport' AS link_kind
 FROM store.link_transport
 WHERE NOT is_self_loop

@@ -16,16 +16,22 @@ WITH clipped AS MATERIALIZED (
     WHERE c.to_ns > p.from_ns AND c.from_ns < p.to_ns AND c.to_ns > c.from_ns
 ),
 boundary AS (
-    SELECT position, from_ns AS at_ns FROM query_table(parts)
+    SELECT
+        position,
+        from_ns AS at_ns
+    FROM query_table(parts)
     UNION
-    SELECT position, from_ns FROM clipped
+    SELECT position, from_ns
+    FROM clipped
     UNION
     SELECT c.position, c.to_ns
     FROM clipped AS c
     JOIN query_table(parts) AS p ON c.position = p.position
     WHERE c.to_ns < p.to_ns
     UNION
-    SELECT position, latest_ns FROM clipped WHERE latest_ns > from_ns AND latest_ns < to_ns
+    SELECT position, latest_ns
+    FROM clipped
+    WHERE latest_ns > from_ns AND latest_ns < to_ns
 ),
 piece AS MATERIALIZED (
     SELECT
@@ -39,7 +45,9 @@ piece AS MATERIALIZED (
 ),
 -- What lasts goes from one piece on to another: both ends of it are boundaries.
 covering AS (
-    SELECT c.*, unnest(range(f.number, l.number + 1)) AS number
+    SELECT
+        c.*,
+        unnest(range(f.number, l.number + 1)) AS number
     FROM clipped AS c
     JOIN piece AS f ON c.position = f.position AND c.from_ns = f.from_ns
     JOIN piece AS l ON c.position = l.position AND c.to_ns = l.to_ns

@@ -24,13 +24,15 @@ caller AS (
 -- join looks up stays in memory until the query ends.
 cause AS (
     SELECT
-        run_id, publication_id, publisher_id, false AS is_message,
+        run_id, publication_id, publisher_id,
+        false AS is_message,
         NULL::BIGINT AS callback_instance_id
     FROM store.publication
     WHERE run_id = only_run
     UNION ALL
     SELECT
-        l.run_id, l.publication_id, l.publisher_id, l.take_id IS NOT NULL,
+        l.run_id, l.publication_id, l.publisher_id,
+        l.take_id IS NOT NULL,
         CASE WHEN l.take_id IS NULL THEN l.callback_instance_id END
     FROM derive.certain_cause AS l
     WHERE l.run_id = only_run
@@ -42,7 +44,8 @@ cause AS (
         ) IS NULL
     UNION ALL
     SELECT
-        run_id, publication_id, publisher_id, take_id IS NOT NULL,
+        run_id, publication_id, publisher_id,
+        take_id IS NOT NULL,
         CASE WHEN take_id IS NULL THEN caller_id END
     FROM called
 ),
@@ -58,7 +61,9 @@ root AS (
     GROUP BY c.run_id, c.publication_id, c.publisher_id
 ),
 way AS (
-    SELECT publication_id, caller_id, min(route) AS route
+    SELECT
+        publication_id, caller_id,
+        min(route) AS route
     FROM called
     WHERE take_id IS NULL
     GROUP BY publication_id, caller_id

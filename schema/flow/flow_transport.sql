@@ -11,6 +11,9 @@ JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
 JOIN store.subscription AS s ON l.subscription_id = s.subscription_id
 WHERE NOT l.is_self_loop AND l.is_copy IS NOT TRUE AND NOT p.is_internal AND NOT s.is_internal
 UNION ALL
-SELECT run_id, publication_id, publisher_id, root_id, -publisher_id, false
+SELECT
+    run_id, publication_id, publisher_id, root_id,
+    -publisher_id,
+    false
 FROM store.flow_root
 WHERE root_kind = 'take'

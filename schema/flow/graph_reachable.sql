@@ -13,7 +13,9 @@ WITH RECURSIVE edge AS MATERIALIZED (
 ),
 known AS (SELECT count(*) AS edge_count FROM edge),
 reached (kind, id) AS (
-    SELECT start_kind::VARCHAR, start_id::BIGINT
+    SELECT
+        start_kind::VARCHAR,
+        start_id::BIGINT
     FROM known
     WHERE max_depth IS NULL AND edge_count >= 0
     UNION
@@ -22,11 +24,16 @@ reached (kind, id) AS (
     JOIN edge AS e ON r.kind = e.from_kind AND r.id = e.from_id
 ),
 near (kind, id, depth) USING KEY (kind, id) AS (
-    SELECT start_kind::VARCHAR, start_id::BIGINT, 0
+    SELECT
+        start_kind::VARCHAR,
+        start_id::BIGINT,
+        0
     FROM known
     WHERE max_depth IS NOT NULL AND edge_count >= 0
     UNION
-    SELECT e.to_kind, e.to_id, min(n.depth) + 1
+    SELECT
+        e.to_kind, e.to_id,
+        min(n.depth) + 1
     FROM near AS n
     JOIN edge AS e ON n.kind = e.from_kind AND n.id = e.from_id
     ANTI JOIN recurring.near AS k ON e.to_kind = k.kind AND e.to_id = k.id

@@ -11,12 +11,17 @@ WITH RECURSIVE hop AS (
     WHERE run_id = only_run
 ),
 reached AS (
-    SELECT subscription_id, 1 AS depth, count(*)::DOUBLE AS number
+    SELECT
+        subscription_id, 1 AS depth,
+        count(*)::DOUBLE AS number
     FROM hop
     WHERE from_subscription_id IS NULL AND is_source
     GROUP BY subscription_id
     UNION ALL
-    SELECT h.subscription_id, r.depth + 1, sum(r.number)
+    SELECT
+        h.subscription_id,
+        r.depth + 1,
+        sum(r.number)
     FROM reached AS r
     JOIN hop AS h ON r.subscription_id = h.from_subscription_id
     WHERE r.depth <= max_depth

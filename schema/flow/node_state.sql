@@ -14,7 +14,8 @@ WITH change AS (
     WINDOW of_node AS (PARTITION BY node_id ORDER BY at_ns)
 )
 SELECT
-    c.run_id, c.node_id, c.start_state AS state,
+    c.run_id, c.node_id,
+    c.start_state AS state,
     coalesce(n.created_ns, p.first_seen_ns) AS start_ns,
     c.at_ns AS end_ns
 FROM change AS c
@@ -22,7 +23,9 @@ JOIN store.node AS n ON c.node_id = n.node_id
 JOIN store.process AS p ON n.process_id = p.process_id
 WHERE c.previous_ns IS NULL
 UNION ALL
-SELECT c.run_id, c.node_id, c.goal_state, c.at_ns, coalesce(c.next_ns, p.last_seen_ns)
+SELECT
+    c.run_id, c.node_id, c.goal_state, c.at_ns,
+    coalesce(c.next_ns, p.last_seen_ns)
 FROM change AS c
 JOIN store.node AS n ON c.node_id = n.node_id
 JOIN store.process AS p ON n.process_id = p.process_id

@@ -23,7 +23,10 @@ topic AS MATERIALIZED (
     ) AS p ON p.topic_name = w.pattern OR p.topic_name GLOB w.pattern
     WHERE list_contains(runs, p.run_id)
 )
-SELECT DISTINCT topic_name, NULL::BIGINT AS node_id FROM topic
+SELECT DISTINCT
+    topic_name,
+    NULL::BIGINT AS node_id
+FROM topic
 UNION ALL
 SELECT DISTINCT NULL, n.node_id
 FROM wanted AS w

@@ -29,7 +29,13 @@ created AS (
     WHERE s.topic_name IS DISTINCT FROM '/parameter_events'
 ),
 -- Most publications are later than all creations: only the others are looked up.
-latest AS (SELECT run_id, max(created_ns) AS created_ns FROM created GROUP BY run_id),
+latest AS (
+    SELECT
+        run_id,
+        max(created_ns) AS created_ns
+    FROM created
+    GROUP BY run_id
+),
 sent AS (
     SELECT
         b.publication_id, p.clock_id, p.reference_clock_id, p.uncertainty_ns,
@@ -40,7 +46,9 @@ sent AS (
         ON b.run_id = n.run_id
         AND derive.corrected_ns(b.end_ns, p) < n.created_ns
 )
-SELECT l.run_id, l.take_id, s.created_ns, s.created_ns - b.end_ns AS stored_ns
+SELECT
+    l.run_id, l.take_id, s.created_ns,
+    s.created_ns - b.end_ns AS stored_ns
 FROM store.link_transport AS l
 JOIN sent AS b ON l.publication_id = b.publication_id
 JOIN created AS s ON l.subscription_id = s.subscription_id

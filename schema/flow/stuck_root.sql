@@ -33,7 +33,9 @@ WITH progress AS (
 -- The step at which each root got stuck; none where only the end is missing.
 stuck AS (
     SELECT
-        m.path_id, m.root_key, p.last_take.take_id AS take_id, p.last_take.taken_ns AS taken_ns,
+        m.path_id, m.root_key,
+        p.last_take.take_id AS take_id,
+        p.last_take.taken_ns AS taken_ns,
         n.publisher_id, n.route, n.subscription_id, n.is_cached,
         CASE WHEN p.last_take IS NULL THEN m.publication_id ELSE c.publication_id END
             AS publication_id
@@ -43,7 +45,9 @@ stuck AS (
         ON m.path_id = l.path_id AND l.depth = coalesce(p.last_take.depth, 0) + 1
     LEFT JOIN query_table(prefixes) AS n ON l.prefix_id = n.path_id
     LEFT JOIN (
-        SELECT take_id, publisher_id, route, max(publication_id) AS publication_id
+        SELECT
+            take_id, publisher_id, route,
+            max(publication_id) AS publication_id
         FROM derive.flow_continuation
         WHERE list_contains(runs, run_id) AND take_id IN (SELECT last_take.take_id FROM progress)
         GROUP BY take_id, publisher_id, route
@@ -62,14 +66,18 @@ delivered AS (
     GROUP BY t.publisher_id, t.subscription_id
 ),
 continued AS (
-    SELECT c.subscription_id, c.publisher_id, c.route, max(t.taken_ns) AS last_ns
+    SELECT
+        c.subscription_id, c.publisher_id, c.route,
+        max(t.taken_ns) AS last_ns
     FROM derive.flow_continuation AS c
     JOIN store.take AS t ON c.take_id = t.take_id
     WHERE list_contains(runs, c.run_id) AND c.publisher_id IN (SELECT publisher_id FROM stuck)
     GROUP BY c.subscription_id, c.publisher_id, c.route
 ),
 finished AS (
-    SELECT a.path_id, max(t.taken_ns) AS last_ns
+    SELECT
+        a.path_id,
+        max(t.taken_ns) AS last_ns
     FROM query_table(arrived) AS a
     JOIN store.take AS t ON a.take_id = t.take_id
     WHERE a.path_id IN (SELECT path_id FROM stuck WHERE publisher_id IS NULL)

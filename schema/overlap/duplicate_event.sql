@@ -18,7 +18,9 @@ WITH recorded AS (
 ),
 preferred AS (
     SELECT
-        l.thread, l.tracepoint, l.session AS left_session, u.session AS used_session,
+        l.thread, l.tracepoint,
+        l.session AS left_session,
+        u.session AS used_session,
         u.first_index AS used_index
     FROM recorded AS l
     JOIN recorded AS u

@@ -2,7 +2,9 @@
 -- grain: one row per pair of sessions and CPU
 -- param: slack_ns BIGINT  Most time between the two records of one event
 SELECT
-    a.session AS left_session, b.session AS used_session, a.cpu_id,
+    a.session AS left_session,
+    b.session AS used_session,
+    a.cpu_id,
     b.begin_ns - $slack_ns AS begin_ns,
     b.end_ns + $slack_ns AS end_ns
 FROM coverage AS a

@@ -6,9 +6,15 @@
 -- column: container BIGINT  First session of its container
 -- when: temp.overlap_window
 WITH RECURSIVE twin AS (
-    SELECT left_session AS session, right_session AS other FROM session_pair WHERE is_same
+    SELECT
+        left_session AS session,
+        right_session AS other
+    FROM session_pair
+    WHERE is_same
     UNION ALL
-    SELECT right_session, left_session FROM session_pair WHERE is_same
+    SELECT right_session, left_session
+    FROM session_pair
+    WHERE is_same
 ),
 reached (session, member) AS (
     SELECT DISTINCT session, session
@@ -18,7 +24,13 @@ reached (session, member) AS (
     FROM reached AS r
     JOIN twin AS t ON r.member = t.session
 ),
-grouped AS (SELECT session, min(member) AS container FROM reached GROUP BY session)
+grouped AS (
+    SELECT
+        session,
+        min(member) AS container
+    FROM reached
+    GROUP BY session
+)
 SELECT session, container
 FROM grouped
 WHERE container IN (

@@ -17,7 +17,9 @@ WITH recorded AS (
 ),
 common AS (
     SELECT
-        l.thread, l.tracepoint, l.session AS left_session, r.session AS right_session,
+        l.thread, l.tracepoint,
+        l.session AS left_session,
+        r.session AS right_session,
         greatest(l.first_ns, r.first_ns) AS from_ns,
         least(l.last_ns, r.last_ns) AS until_ns
     FROM recorded AS l
@@ -52,7 +54,9 @@ compared AS (
     GROUP BY l.left_session, l.right_session, l.thread, l.tracepoint
 ),
 right_counted AS (
-    SELECT left_session, right_session, thread, tracepoint, count(*) AS right_count
+    SELECT
+        left_session, right_session, thread, tracepoint,
+        count(*) AS right_count
     FROM event
     WHERE session = right_session
     GROUP BY left_session, right_session, thread, tracepoint

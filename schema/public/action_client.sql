@@ -12,14 +12,20 @@
 -- column: goal_count BIGINT  Goals that it sent; NULL: requests have no events in the traces of its
 --     host (before Kilted)
 WITH sent AS (
-    SELECT client_id, count(DISTINCT sequence_number) AS number
+    SELECT
+        client_id,
+        count(DISTINCT sequence_number) AS number
     FROM store.request
     GROUP BY client_id
 )
 SELECT
-    a.run_id, a.goal_object_id AS action_client_id, a.process_id, a.node_id, a.action_name,
-    a.cancel_object_id AS cancel_client_id, a.result_object_id AS result_client_id,
-    a.feedback_object_id AS feedback_subscription_id, a.status_object_id AS status_subscription_id,
+    a.run_id,
+    a.goal_object_id AS action_client_id,
+    a.process_id, a.node_id, a.action_name,
+    a.cancel_object_id AS cancel_client_id,
+    a.result_object_id AS result_client_id,
+    a.feedback_object_id AS feedback_subscription_id,
+    a.status_object_id AS status_subscription_id,
     c.created_ns,
     coalesce(q.number, CASE WHEN a.process_id IN (FROM derive.call_traced) THEN 0 END)
         AS goal_count

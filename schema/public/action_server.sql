@@ -14,21 +14,29 @@
 -- column: feedback_count BIGINT  Feedback messages that it published, of all goals
 -- column: status_count BIGINT  Status messages that it published
 WITH taken AS (
-    SELECT service_id, count(*) AS number
+    SELECT
+        service_id,
+        count(*) AS number
     FROM store.request
     WHERE taken_ns IS NOT NULL
     GROUP BY service_id
 ),
 published AS (
-    SELECT publisher_id, count(*) AS number
+    SELECT
+        publisher_id,
+        count(*) AS number
     FROM store.publication
     WHERE publisher_id IN (SELECT object_id FROM derive.action_endpoint WHERE kind = 'publisher')
     GROUP BY publisher_id
 )
 SELECT
-    a.run_id, a.goal_object_id AS action_server_id, a.process_id, a.node_id, a.action_name,
-    a.cancel_object_id AS cancel_service_id, a.result_object_id AS result_service_id,
-    a.feedback_object_id AS feedback_publisher_id, a.status_object_id AS status_publisher_id,
+    a.run_id,
+    a.goal_object_id AS action_server_id,
+    a.process_id, a.node_id, a.action_name,
+    a.cancel_object_id AS cancel_service_id,
+    a.result_object_id AS result_service_id,
+    a.feedback_object_id AS feedback_publisher_id,
+    a.status_object_id AS status_publisher_id,
     s.created_ns,
     coalesce(q.number, CASE WHEN a.process_id IN (FROM derive.call_traced) THEN 0 END)
         AS goal_count,

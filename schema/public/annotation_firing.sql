@@ -11,10 +11,16 @@
 -- column: linked_count BIGINT  Inputs with a message
 -- column: is_complete BOOLEAN  Every input has a message
 WITH input AS (
-    SELECT annotation_id, count(*) AS number FROM store.annotation_input GROUP BY annotation_id
+    SELECT
+        annotation_id,
+        count(*) AS number
+    FROM store.annotation_input
+    GROUP BY annotation_id
 ),
 linked AS (
-    SELECT annotation_id, publication_id, count(*) AS number
+    SELECT
+        annotation_id, publication_id,
+        count(*) AS number
     FROM store.link_causal
     WHERE annotation_id IS NOT NULL
     GROUP BY annotation_id, publication_id

@@ -22,17 +22,25 @@
 -- column: run_queue_ns BIGINT [ns]  From the waking until the thread had a CPU; NULL: not known
 -- column: executor_ns BIGINT [ns]  From there until the take; with the two before it is the latency
 WITH waking AS (
-    SELECT s.thread_id, s.end_ns AS at_ns, s.waker_kind, s.waker_thread_id, s.waker_other_thread_id
+    SELECT
+        s.thread_id,
+        s.end_ns AS at_ns,
+        s.waker_kind, s.waker_thread_id, s.waker_other_thread_id
     FROM main.thread_state AS s
     WHERE s.state = 'sleeping'
 ),
 -- What a thread does has begun before it takes a message, unless that is all it woke for.
 done AS (
-    SELECT thread_id, taken_ns AS at_ns FROM main.take
+    SELECT
+        thread_id,
+        taken_ns AS at_ns
+    FROM main.take
     UNION ALL
-    SELECT thread_id, start_ns FROM main.callback_instance
+    SELECT thread_id, start_ns
+    FROM main.callback_instance
     UNION ALL
-    SELECT thread_id, start_ns FROM main.publication
+    SELECT thread_id, start_ns
+    FROM main.publication
 ),
 taken AS NOT MATERIALIZED (
     SELECT
@@ -44,7 +52,10 @@ taken AS NOT MATERIALIZED (
     WHERE l.latency_ns IS NOT NULL
 ),
 woken AS (
-    SELECT k.*, w.at_ns AS arrived_ns, w.waker_kind, w.waker_thread_id, w.waker_other_thread_id
+    SELECT
+        k.*,
+        w.at_ns AS arrived_ns,
+        w.waker_kind, w.waker_thread_id, w.waker_other_thread_id
     FROM (FROM taken WHERE thread_id IN (SELECT thread_id FROM main.thread_state)) AS k
     ASOF JOIN waking AS w ON k.thread_id = w.thread_id AND k.taken_ns >= w.at_ns
     WHERE w.at_ns >= k.start_ns AND w.waker_kind IS NOT NULL
@@ -55,7 +66,9 @@ behind AS (
     ASOF JOIN done AS d ON w.thread_id = d.thread_id AND w.taken_ns > d.at_ns
 ),
 on_cpu AS (
-    SELECT w.take_id, r.start_ns AS on_cpu_ns
+    SELECT
+        w.take_id,
+        r.start_ns AS on_cpu_ns
     FROM woken AS w
     ASOF JOIN (SELECT * FROM main.thread_state WHERE state IN ('running', 'unknown')) AS r
         ON w.thread_id = r.thread_id AND w.arrived_ns <= r.start_ns
@@ -85,8 +98,10 @@ by_waking AS MATERIALIZED (
 ),
 heard AS (
     SELECT
-        k.run_id, k.take_id, k.publication_id, k.taken_ns - d.waited_ns AS arrived_ns, k.end_ns,
-        d.waited_ns, NOT d.is_ambiguous AS is_exact
+        k.run_id, k.take_id, k.publication_id,
+        k.taken_ns - d.waited_ns AS arrived_ns,
+        k.end_ns, d.waited_ns,
+        NOT d.is_ambiguous AS is_exact
     FROM main.data_arrival AS d
     JOIN taken AS k ON d.take_id = k.take_id
     ANTI JOIN (SELECT take_id FROM by_waking WHERE is_exact) AS w ON d.take_id = w.take_id
@@ -99,5 +114,6 @@ WHERE take_id NOT IN (SELECT take_id FROM heard)
 UNION ALL
 SELECT
     run_id, take_id, publication_id, arrived_ns, 'listener', NULL, NULL, is_exact,
-    arrived_ns - end_ns, NULL, waited_ns
+    arrived_ns - end_ns,
+    NULL, waited_ns
 FROM heard

@@ -13,8 +13,12 @@
 SELECT
     i.callback_instance_id, i.run_id, i.start_ns,
     i.end_ns - i.start_ns AS duration_ns,
-    l.node, l.label AS callback, p.name AS process, p.pid, t.tid, h.hostname AS host, i.callback_id,
-    i.take_id, l.is_internal
+    l.node,
+    l.label AS callback,
+    p.name AS process,
+    p.pid, t.tid,
+    h.hostname AS host,
+    i.callback_id, i.take_id, l.is_internal
 FROM main.callback_instance AS i
 JOIN main.callback_label AS l ON i.callback_id = l.callback_id
 JOIN store.process AS p ON i.process_id = p.process_id

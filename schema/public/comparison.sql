@@ -77,7 +77,11 @@ flow AS (
     WHERE what IN ('paths', 'ends')
 ),
 outcome AS (
-    SELECT *, path AS subject FROM flow WHERE what IS NOT DISTINCT FROM 'paths'
+    SELECT
+        *,
+        path AS subject
+    FROM flow
+    WHERE what IS NOT DISTINCT FROM 'paths'
     UNION ALL BY NAME
     SELECT
         *,
@@ -89,7 +93,10 @@ outcome AS (
 thing AS (
     -- A root counts once, however often it arrived; not those that could not arrive, or were cut.
     SELECT
-        run_id, subject, false AS is_internal, root_ns AS at_ns, root_id AS id,
+        run_id, subject,
+        false AS is_internal,
+        root_ns AS at_ns,
+        root_id AS id,
         CASE
             WHEN status <> 'reached' THEN NULL
             WHEN wanted_case = 'first' AND NOT is_first THEN NULL
@@ -103,8 +110,13 @@ thing AS (
     FROM outcome
     UNION ALL
     SELECT
-        i.run_id, l.node || ' · ' || l.label, l.is_internal, i.start_ns, i.callback_instance_id,
-        i.end_ns - i.start_ns, true, i.end_ns IS NOT NULL, i.is_loss_affected, false, false
+        i.run_id,
+        l.node || ' · ' || l.label,
+        l.is_internal, i.start_ns, i.callback_instance_id,
+        i.end_ns - i.start_ns,
+        true,
+        i.end_ns IS NOT NULL,
+        i.is_loss_affected, false, false
     FROM main.callback_instance AS i
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
     WHERE what IS NOT DISTINCT FROM 'callbacks' AND list_contains([run_a, run_b], i.run_id)
@@ -112,7 +124,8 @@ thing AS (
     SELECT
         t.run_id,
         coalesce(s.topic_name, '?') || ' → ' || main.node_label(n.full_name, p.name, p.pid),
-        coalesce(s.is_internal, false), t.taken_ns, t.take_id, l.latency_ns, true,
+        coalesce(s.is_internal, false),
+        t.taken_ns, t.take_id, l.latency_ns, true,
         l.take_id IS NOT NULL,
         t.is_loss_affected OR coalesce(l.is_loss_affected, false),
         l.candidate_count > 1,
@@ -176,7 +189,9 @@ centred AS MATERIALIZED (
     WHERE s.value_ns IS NOT NULL AND m.number >= 20
 ),
 warm_up AS (
-    SELECT w.side, w.subject, w.last_ns - s.start_ns + skip_ns AS warm_up_ns
+    SELECT
+        w.side, w.subject,
+        w.last_ns - s.start_ns + skip_ns AS warm_up_ns
     FROM derive.warm_up('centred') AS w
     JOIN side AS s ON w.side = s.side
 ),
@@ -200,12 +215,19 @@ paired AS (
         coalesce(a.subject, b.subject) AS subject,
         coalesce(a.statistic, b.statistic) AS statistic,
         coalesce(a.quantile, b.quantile) AS quantile,
-        a.value_ns AS a_ns, b.value_ns AS b_ns,
+        a.value_ns AS a_ns,
+        b.value_ns AS b_ns,
         coalesce(a.number, 0) AS a_count,
         coalesce(b.number, 0) AS b_count,
-        a.independent AS a_independent, b.independent AS b_independent, a.share AS a_share,
-        b.share AS b_share, a.loss_affected AS a_loss_affected, b.loss_affected AS b_loss_affected,
-        a.ambiguous AS a_ambiguous, b.ambiguous AS b_ambiguous, a.warm_up_ns AS a_warm_up_ns,
+        a.independent AS a_independent,
+        b.independent AS b_independent,
+        a.share AS a_share,
+        b.share AS b_share,
+        a.loss_affected AS a_loss_affected,
+        b.loss_affected AS b_loss_affected,
+        a.ambiguous AS a_ambiguous,
+        b.ambiguous AS b_ambiguous,
+        a.warm_up_ns AS a_warm_up_ns,
         b.warm_up_ns AS b_warm_up_ns,
         coalesce(a.is_cut, false) OR coalesce(b.is_cut, false) AS is_cut
     FROM (FROM value WHERE side = 'a') AS a

@@ -25,7 +25,9 @@ WITH RECURSIVE given AS MATERIALIZED (
 -- two calls at once the second counts from when the first returned.
 waited_call AS MATERIALIZED (
     SELECT
-        callback_instance_id, request_id, server_instance_id, from_ns AS sent_ns, returned_ns,
+        callback_instance_id, request_id, server_instance_id,
+        from_ns AS sent_ns,
+        returned_ns,
         CASE WHEN taken_ns IS NOT NULL THEN least(greatest(taken_ns, from_ns), returned_ns) END
             AS taken_ns,
         CASE WHEN start_ns IS NOT NULL
@@ -34,7 +36,9 @@ waited_call AS MATERIALIZED (
             THEN least(greatest(answered_ns, start_ns, taken_ns, from_ns), returned_ns) END
             AS answered_ns
     FROM (
-        SELECT *, greatest(sent_ns, max(returned_ns) OVER earlier) AS from_ns
+        SELECT
+            *,
+            greatest(sent_ns, max(returned_ns) OVER earlier) AS from_ns
         FROM main.waited_call
         WHERE list_contains(runs, run_id)
         WINDOW earlier AS (
@@ -48,7 +52,8 @@ waited_call AS MATERIALIZED (
 -- each with what goes on when it returns.
 call AS (
     SELECT
-        g.position, g.part, g.callback_instance_id, NULL::BIGINT AS outer_id,
+        g.position, g.part, g.callback_instance_id,
+        NULL::BIGINT AS outer_id,
         w.* EXCLUDE (callback_instance_id)
     FROM given AS g
     JOIN waited_call AS w ON g.callback_instance_id = w.callback_instance_id
@@ -66,8 +71,12 @@ call AS (
 -- When parts begin. What of a call was not traced is a part of what comes before it.
 moment AS (
     SELECT
-        position, from_ns AS at_ns, NULL::BIGINT AS sent_ns, part, callback_instance_id,
-        NULL::BIGINT AS request_id, 0 AS place
+        position,
+        from_ns AS at_ns,
+        NULL::BIGINT AS sent_ns,
+        part, callback_instance_id,
+        NULL::BIGINT AS request_id,
+        0 AS place
     FROM given
     UNION ALL
     SELECT position, returned_ns, sent_ns, part, callback_instance_id, outer_id, 5
@@ -93,7 +102,8 @@ moment AS (
 part AS MATERIALIZED (
     SELECT
         g.run_id, g.path_id, g.root_kind, g.root_id, g.take_id, g.latency_ns, g.flow_rank, g.hop,
-        g.publication_id, m.part, m.callback_instance_id, m.request_id, m.at_ns AS from_ns,
+        g.publication_id, m.part, m.callback_instance_id, m.request_id,
+        m.at_ns AS from_ns,
         coalesce(lead(m.at_ns) OVER in_time, g.to_ns) AS to_ns,
         row_number() OVER (ORDER BY m.position, m.at_ns, m.sent_ns NULLS FIRST, m.place) AS position
     FROM moment AS m
@@ -108,7 +118,9 @@ waiting AS MATERIALIZED (
 ),
 -- What ran later tells nothing of them.
 waited AS MATERIALIZED (
-    SELECT x.executor_id, max(i.start_ns) AS until_ns
+    SELECT
+        x.executor_id,
+        max(i.start_ns) AS until_ns
     FROM store.callback_instance AS i
     JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
     WHERE i.callback_instance_id IN (SELECT callback_instance_id FROM waiting)
@@ -151,7 +163,9 @@ meanwhile AS MATERIALIZED (
 ),
 -- Several threads of an executor wait for work one at a time.
 several AS (
-    SELECT executor_id, max(start_ns) AS until_ns
+    SELECT
+        executor_id,
+        max(start_ns) AS until_ns
     FROM ready
     WHERE thread_count > 1
     GROUP BY executor_id
@@ -166,12 +180,17 @@ held AS MATERIALIZED (
         row_number() OVER (PARTITION BY executor_id ORDER BY start_ns) AS number
     FROM (
         SELECT
-            executor_id, end_ns AS start_ns,
+            executor_id,
+            end_ns AS start_ns,
             coalesce(lead(start_ns) OVER in_time, 9223372036854775807) AS end_ns
         FROM poll
         WINDOW in_time AS (PARTITION BY executor_id ORDER BY end_ns)
         UNION ALL
-        SELECT executor_id, 0, min(start_ns) FROM poll GROUP BY executor_id
+        SELECT
+            executor_id, 0,
+            min(start_ns)
+        FROM poll
+        GROUP BY executor_id
     )
 ),
 -- Looked up at both ends: each wait compared with each of these times takes minutes.
@@ -194,7 +213,9 @@ unserved AS (
     WHERE has_teams AND m.earliest_ns < h.end_ns
     UNION ALL
     SELECT
-        callback_instance_id, thread_id, latest_ns, greatest(earliest_ns, picked_ns), start_ns
+        callback_instance_id, thread_id, latest_ns,
+        greatest(earliest_ns, picked_ns),
+        start_ns
     FROM ready
     WHERE has_teams AND earliest_ns IS NOT NULL AND executor_id IN (SELECT executor_id FROM poll)
 ),
@@ -213,9 +234,9 @@ full_house AS (
 exclusion AS MATERIALIZED (FROM derive.callback_exclusion WHERE has_teams),
 occupied AS (
     SELECT
-        m.callback_instance_id, 1 AS priority, 'executor_busy' AS activity, m.from_ns, m.to_ns,
-        m.latest_ns,
-        m.meanwhile_id
+        m.callback_instance_id, 1 AS priority,
+        'executor_busy' AS activity,
+        m.from_ns, m.to_ns, m.latest_ns, m.meanwhile_id
     FROM meanwhile AS m
     JOIN derive.executor_size AS s ON m.executor_id = s.executor_id
     WHERE s.thread_count = 1
@@ -224,7 +245,9 @@ occupied AS (
         m.callback_instance_id, 1,
         CASE WHEN m.executor_id IN (SELECT executor_id FROM poll) THEN 'all_threads_busy'
             ELSE 'executor_busy' END,
-        greatest(m.from_ns, b.start_ns), least(m.to_ns, b.end_ns), m.latest_ns, m.meanwhile_id
+        greatest(m.from_ns, b.start_ns),
+        least(m.to_ns, b.end_ns),
+        m.latest_ns, m.meanwhile_id
     FROM meanwhile AS m
     JOIN full_house AS b
         ON m.executor_id = b.executor_id AND m.from_ns < b.end_ns AND m.to_ns > b.start_ns
@@ -254,8 +277,10 @@ occupied AS (
 -- The message whose callback published for what lay in the cache, or the timer that did.
 completing AS (
     SELECT
-        w.position, w.from_ns, w.to_ns, b.publication_id, b.start_ns AS published_ns, b.end_ns,
-        t.taken_ns, i.callback_instance_id, s.callback_instance_id AS publishing_id,
+        w.position, w.from_ns, w.to_ns, b.publication_id,
+        b.start_ns AS published_ns,
+        b.end_ns, t.taken_ns, i.callback_instance_id,
+        s.callback_instance_id AS publishing_id,
         s.start_ns AS publishing_ns
     FROM waiting AS w
     JOIN main.callback_instance AS i ON w.callback_instance_id = i.callback_instance_id
@@ -269,7 +294,8 @@ completing AS (
 candidate AS (
     SELECT
         w.position, o.priority, o.activity, o.from_ns, o.to_ns, o.latest_ns,
-        o.meanwhile_id AS callback_instance_id, NULL::BIGINT AS publication_id
+        o.meanwhile_id AS callback_instance_id,
+        NULL::BIGINT AS publication_id
     FROM waiting AS w
     JOIN occupied AS o ON w.callback_instance_id = o.callback_instance_id
     WHERE o.priority <= 2 OR w.part <> 'take_to_callback'
@@ -281,10 +307,12 @@ candidate AS (
     UNION ALL
     -- Before it is known that the input was there, the executor may have been what it waited for.
     SELECT
-        w.position, 5, 'undecided', coalesce(c.end_ns, w.from_ns),
+        w.position, 5, 'undecided',
+        coalesce(c.end_ns, w.from_ns),
         CASE WHEN i.callback_instance_id IS NULL THEN coalesce(c.taken_ns, w.to_ns)
             ELSE least(c.taken_ns, i.latest_ns) END,
-        NULL, w.callback_instance_id, coalesce(c.publication_id, w.publication_id)
+        NULL, w.callback_instance_id,
+        coalesce(c.publication_id, w.publication_id)
     FROM waiting AS w
     LEFT JOIN completing AS c ON w.position = c.position
     LEFT JOIN wait AS i ON w.callback_instance_id = i.callback_instance_id
@@ -401,8 +429,8 @@ SELECT
     coalesce(s.to_ns, w.to_ns) AS to_ns,
     coalesce(s.to_ns - s.from_ns, w.duration_ns) AS duration_ns,
     w.is_certain, w.callback_instance_id, w.publication_id, s.state, s.wakers,
-    s.thread_id AS state_thread_id, s.priority, s.by_kind, s.by_thread_id, s.by_other_thread_id,
-    s.by_priority, w.request_id
+    s.thread_id AS state_thread_id,
+    s.priority, s.by_kind, s.by_thread_id, s.by_other_thread_id, s.by_priority, w.request_id
 FROM whole AS w
 LEFT JOIN (FROM main.schedule_piece('interval', runs) WHERE has_kernel) AS s
     ON w.interval_id = s.interval_id AND s.state IS NOT NULL

@@ -68,7 +68,9 @@ idle AS MATERIALIZED (
 ),
 published AS MATERIALIZED (
     SELECT
-        l.node_id, l.publisher_id, c.timer_id, c.subscription_id AS trigger_id, b.start_ns,
+        l.node_id, l.publisher_id, c.timer_id,
+        c.subscription_id AS trigger_id,
+        b.start_ns,
         i.end_ns - i.start_ns AS run_ns
     FROM caused AS l
     SEMI JOIN idle AS d ON l.node_id = d.node_id
@@ -161,7 +163,8 @@ loop AS (
 )
 SELECT
     o.run_id, o.node_id, o.subscription_id, s.topic_name, o.message_count, o.publisher_id,
-    p.topic_name AS output_topic, o.timer_id, o.trigger_id,
+    p.topic_name AS output_topic,
+    o.timer_id, o.trigger_id,
     CASE
         WHEN o.trigger_id IS NOT NULL THEN 'from ' || coalesce(g.topic_name, '?')
         WHEN o.timer_id IS NULL THEN 'outside of callbacks'

@@ -49,7 +49,9 @@ lineage (path_id, prefix_id, depth, parent_path_id) AS (
     JOIN chain AS c ON l.parent_path_id = c.path_id
 ),
 path AS MATERIALIZED (
-    SELECT *, dense_rank() OVER (ORDER BY publisher_id, subscription_id, route) AS way_id
+    SELECT
+        *,
+        dense_rank() OVER (ORDER BY publisher_id, subscription_id, route) AS way_id
     FROM chain
     WHERE path_id IN (SELECT prefix_id FROM lineage)
 ),
@@ -81,13 +83,16 @@ root AS MATERIALIZED (
 ),
 stored AS MATERIALIZED (SELECT take_id FROM derive.stored_take WHERE list_contains(runs, run_id)),
 transport AS NOT MATERIALIZED (
-    SELECT *, take_id IN (SELECT take_id FROM stored) AS is_stored
+    SELECT
+        *,
+        take_id IN (SELECT take_id FROM stored) AS is_stored
     FROM derive.flow_transport
     WHERE list_contains(runs, run_id)
 ),
 step AS MATERIALIZED (
     SELECT
-        c.take_id AS from_take_id, w.way_id, t.take_id, t.is_stored,
+        c.take_id AS from_take_id,
+        w.way_id, t.take_id, t.is_stored,
         c.is_ambiguous OR t.is_ambiguous AS is_ambiguous
     FROM derive.flow_continuation AS c
     JOIN transport AS t ON c.publication_id = t.publication_id
@@ -111,7 +116,8 @@ reached (path_id, root_key, take_id, is_stored, is_ambiguous) AS (
     UNION ALL
     SELECT
         p.path_id, r.root_key, s.take_id,
-        bool_or(r.is_stored OR s.is_stored), bool_or(r.is_ambiguous OR s.is_ambiguous)
+        bool_or(r.is_stored OR s.is_stored),
+        bool_or(r.is_ambiguous OR s.is_ambiguous)
     FROM reached AS r
     JOIN path AS p ON r.path_id = p.parent_path_id
     JOIN step AS s ON r.take_id = s.from_take_id AND p.way_id = s.way_id
@@ -146,7 +152,8 @@ pair AS MATERIALIZED (
 ),
 expected AS MATERIALIZED (
     SELECT
-        p.run_id, p.path_id, r.root_key, min(r.root_ns) AS root_ns,
+        p.run_id, p.path_id, r.root_key,
+        min(r.root_ns) AS root_ns,
         arg_max(r.publication_id, r.published_ns) AS publication_id
     FROM path AS p
     JOIN root AS r ON p.first_publisher_id = r.publisher_id AND p.first_route = r.route
@@ -163,9 +170,19 @@ outcome AS MATERIALIZED (
     FROM pair AS a
     JOIN expected AS e ON a.path_id = e.path_id AND a.root_key = e.root_key
     UNION ALL BY NAME
-    SELECT path_id, root_key, root_ns, false AS is_stored, false AS is_ambiguous FROM missing
+    SELECT
+        path_id, root_key, root_ns,
+        false AS is_stored,
+        false AS is_ambiguous
+    FROM missing
 ),
-longest AS (SELECT path_id, max(sink_ns - root_ns) AS longest_ns FROM outcome GROUP BY path_id),
+longest AS (
+    SELECT
+        path_id,
+        max(sink_ns - root_ns) AS longest_ns
+    FROM outcome
+    GROUP BY path_id
+),
 -- With time enough for the longest flow it is not the recording that cut a root.
 explained AS (
     SELECT

@@ -19,7 +19,12 @@
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time
 -- column: is_ambiguous BOOLEAN  All its paths pass a link that may be another one
 CREATE OR REPLACE MACRO main.end_to_end_between(arrivals) AS TABLE
-WITH flow AS (SELECT *, string_split(path, ' → ')[-1] AS node FROM query_table(arrivals)),
+WITH flow AS (
+    SELECT
+        *,
+        string_split(path, ' → ')[-1] AS node
+    FROM query_table(arrivals)
+),
 united AS (
     SELECT
         run_id, first_topic, last_topic, node, root_kind, root_id, take_id,

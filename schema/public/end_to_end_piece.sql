@@ -9,7 +9,8 @@
 CREATE OR REPLACE MACRO main.end_to_end_piece(flows, trail, runs) AS TABLE
 WITH every_callback_instance AS NOT MATERIALIZED (
     SELECT
-        callback_instance_id, callback_id, take_id, start_ns, end_ns, NULL::BIGINT AS busy_min_ns,
+        callback_instance_id, callback_id, take_id, start_ns, end_ns,
+        NULL::BIGINT AS busy_min_ns,
         NULL::BIGINT AS busy_max_ns
     FROM main.callback_instance
 )

@@ -32,9 +32,11 @@ roundabout AS MATERIALIZED (
     SELECT c.publication_id, c.entered_id, c.publishing_id, c.publishing_key, c.kind
     FROM (
         SELECT
-            publication_id, callback_instance_id AS entered_id,
+            publication_id,
+            callback_instance_id AS entered_id,
             callback_instance_id AS publishing_id,
-            derive.vertex_key('callback_instance', callback_instance_id) AS publishing_key, kind
+            derive.vertex_key('callback_instance', callback_instance_id) AS publishing_key,
+            kind
         FROM store.link_causal
         WHERE list_contains(runs, run_id) AND kind <> 'direct'
         UNION ALL
@@ -69,15 +71,20 @@ origin AS MATERIALIZED (
     SELECT a.called_key, a.request_id, s.sender_key
     FROM (
         SELECT
-            derive.vertex_key('callback_instance', callback_instance_id) AS called_key, request_id
+            derive.vertex_key('callback_instance', callback_instance_id) AS called_key,
+            request_id
         FROM store.callback_instance
         WHERE list_contains(runs, run_id) AND request_id IS NOT NULL
         UNION ALL
-        SELECT derive.vertex_key('request', request_id), request_id
+        SELECT
+            derive.vertex_key('request', request_id),
+            request_id
         FROM store.request
         WHERE list_contains(runs, run_id)
         UNION ALL
-        SELECT derive.vertex_key('response', response_id), request_id
+        SELECT
+            derive.vertex_key('response', response_id),
+            request_id
         FROM store.response
         WHERE list_contains(runs, run_id)
     ) AS a
@@ -93,7 +100,10 @@ leg (publishing_key, caller_id, level, request_id, called_key, sender_key) AS (
     ) AS c
     JOIN origin AS o ON c.publishing_key = o.called_key
     UNION
-    SELECT g.publishing_key, g.caller_id, g.level + 1, o.request_id, o.called_key, o.sender_key
+    SELECT
+        g.publishing_key, g.caller_id,
+        g.level + 1,
+        o.request_id, o.called_key, o.sender_key
     FROM leg AS g
     JOIN origin AS o ON g.sender_key = o.called_key
     WHERE g.sender_key <> derive.vertex_key('callback_instance', g.caller_id)
@@ -119,7 +129,8 @@ call AS (
 ),
 cached AS (
     SELECT
-        c.publication_id, c.entered_id, coalesce(i.end_ns, i.start_ns) AS stored_ns,
+        c.publication_id, c.entered_id,
+        coalesce(i.end_ns, i.start_ns) AS stored_ns,
         s.callback_instance_id, s.callback_id, s.start_ns
     FROM roundabout AS c
     JOIN callback AS i ON c.publishing_id = i.callback_instance_id
@@ -182,9 +193,10 @@ turn AS MATERIALIZED (
 message AS (
     SELECT
         f.run_id, f.path_id, f.flow_id, f.root_kind, f.root_id, f.take_id, f.latency_ns, f.sink_ns,
-        h.hop, b.publication_id, t.taken_ns, i.start_ns AS called_ns, i.callback_instance_id,
-        i.callback_id, i.busy_min_ns, i.busy_max_ns,
-        b.start_ns, b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns,
+        h.hop, b.publication_id, t.taken_ns,
+        i.start_ns AS called_ns,
+        i.callback_instance_id, i.callback_id, i.busy_min_ns, i.busy_max_ns, b.start_ns, b.intra_ns,
+        b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns,
         coalesce(b.end_ns, f.root_ns) AS end_ns,
         -- Where the first layer of publishing is not known.
         b.start_ns IS DISTINCT FROM least(b.intra_ns, b.rclcpp_ns, b.rcl_ns, b.rmw_ns, b.dds_ns)
@@ -291,7 +303,8 @@ SELECT
     hop + (number > parts)::INTEGER AS hop,
     place + number AS position,
     CASE WHEN number > parts THEN 1 ELSE number END AS rank,
-    moment.part, moment.at_ns AS from_ns,
+    moment.part,
+    moment.at_ns AS from_ns,
     coalesce(next.at_ns, until_ns) AS to_ns,
     to_ns - from_ns AS duration_ns,
     moment.callback_instance_id, moment.publication_id, moment.callback_id, moment.busy_min_ns,

@@ -20,7 +20,8 @@ chain AS NOT MATERIALIZED (FROM query_table(chains)),
 -- Before each message of a path but the first: the message that led to it, and how.
 link AS MATERIALIZED (
     SELECT
-        c.path_id, p.path_id AS parent_path_id,
+        c.path_id,
+        p.path_id AS parent_path_id,
         dense_rank() OVER (ORDER BY c.route, p.publisher_id, p.subscription_id) AS way_id,
         c.route, p.publisher_id, p.subscription_id
     FROM chain AS c
@@ -29,7 +30,9 @@ link AS MATERIALIZED (
 way AS MATERIALIZED (SELECT DISTINCT way_id, route, publisher_id, subscription_id FROM link),
 -- What led to each publication, by way of a callback of the node or of a service that it called.
 continuation AS NOT MATERIALIZED (
-    SELECT publication_id, take_id, subscription_id, []::BIGINT[] AS route
+    SELECT
+        publication_id, take_id, subscription_id,
+        []::BIGINT[] AS route
     FROM derive.certain_cause
     WHERE list_contains(runs, run_id)
     UNION ALL
@@ -40,7 +43,9 @@ continuation AS NOT MATERIALIZED (
 -- Steps back: from a publication to the message that led to it. What recursion looks up stays in
 -- memory: one number stands for all that a step has to fit.
 step AS MATERIALIZED (
-    SELECT c.publication_id AS next_publication_id, w.way_id, t.take_id, t.publication_id
+    SELECT
+        c.publication_id AS next_publication_id,
+        w.way_id, t.take_id, t.publication_id
     FROM continuation AS c
     JOIN derive.flow_transport AS t ON c.take_id = t.take_id
     JOIN way AS w
@@ -54,7 +59,10 @@ step AS MATERIALIZED (
 trail (
     flow_id, path_id, hop, take_id, publication_id, next_take_id, publications_rank, takes_rank
 ) AS (
-    SELECT f.flow_id, c.path_id, c.depth, f.take_id, t.publication_id, NULL::BIGINT, 1, 1
+    SELECT
+        f.flow_id, c.path_id, c.depth, f.take_id, t.publication_id,
+        NULL::BIGINT,
+        1, 1
     FROM flow AS f
     JOIN chain AS c ON f.path_id = c.path_id
     JOIN derive.flow_transport AS t ON f.take_id = t.take_id
@@ -66,7 +74,8 @@ trail (
         dense_rank() OVER (ORDER BY flow_id, take_id, way.takes_rank)
     FROM (
         SELECT
-            r.flow_id, l.parent_path_id AS path_id,
+            r.flow_id,
+            l.parent_path_id AS path_id,
             r.hop - 1 AS hop,
             s.take_id, s.publication_id,
             min(struct_pack(
@@ -96,7 +105,13 @@ whole AS (
     ) = 1
 ),
 hop (flow_id, hop, take_id, publication_id, previous_take_id, next_take_id) AS (
-    SELECT flow_id, 1::BIGINT, take_id, publication_id, NULL::BIGINT, next_take_id FROM whole
+    SELECT
+        flow_id,
+        1::BIGINT,
+        take_id, publication_id,
+        NULL::BIGINT,
+        next_take_id
+    FROM whole
     UNION ALL
     SELECT h.flow_id, r.hop, r.take_id, r.publication_id, h.take_id, r.next_take_id
     FROM hop AS h

@@ -11,6 +11,11 @@
 -- column: overlap_ns BIGINT [ns]  Overlap from earliest_ns of the wait on (from latest_ns if that
 --     is unknown)
 -- column: certain_ns BIGINT [ns]  Overlap from latest_ns of the wait on
-WITH executor AS (SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size),
+WITH executor AS (
+    SELECT
+        executor_id,
+        NULL::BIGINT AS until_ns
+    FROM derive.executor_size
+),
 ready AS (FROM derive.callback_ready('executor'))
 FROM derive.executor_meanwhile('ready')

@@ -9,6 +9,11 @@
 -- column: executor_id, thread_id, callback_id, since, origin_ns, earliest_ns, latest_ns
 -- column: start_ns BIGINT [epoch ns]  callback_start
 -- column: wait_ns, busy_min_ns, busy_max_ns, blocked_max_ns, idle_ns, is_loss_affected, held_max_ns
-WITH executor AS (SELECT executor_id, NULL::BIGINT AS until_ns FROM derive.executor_size),
+WITH executor AS (
+    SELECT
+        executor_id,
+        NULL::BIGINT AS until_ns
+    FROM derive.executor_size
+),
 ready AS (FROM derive.callback_ready('executor'))
 FROM derive.executor_waits('ready')

@@ -30,7 +30,9 @@ CREATE OR REPLACE MACRO main.executor_wait_explained(
     runs, arrivals := 'arrival_here', waits := 'wait_here', has_kernel := true, has_teams := true
 ) AS TABLE
 WITH executor AS (
-    SELECT executor_id, NULL::BIGINT AS until_ns
+    SELECT
+        executor_id,
+        NULL::BIGINT AS until_ns
     FROM derive.executor_size
     WHERE list_contains(runs, run_id)
 ),
@@ -50,18 +52,23 @@ arrived AS (
 ready AS MATERIALIZED (
     SELECT
         r.run_id, r.executor_id, r.thread_id, r.callback_id, r.callback_instance_id, r.since,
-        r.origin_ns, coalesce(a.arrived_ns, r.earliest_ns) AS earliest_ns,
-        coalesce(a.arrived_ns, r.latest_ns) AS latest_ns, r.start_ns, r.thread_count, r.picked_ns,
-        r.wait_start_ns, r.previous_wait_end_ns, r.is_loss_affected, a.until_arrival_ns
+        r.origin_ns,
+        coalesce(a.arrived_ns, r.earliest_ns) AS earliest_ns,
+        coalesce(a.arrived_ns, r.latest_ns) AS latest_ns,
+        r.start_ns, r.thread_count, r.picked_ns, r.wait_start_ns, r.previous_wait_end_ns,
+        r.is_loss_affected, a.until_arrival_ns
     FROM query_table(waits) AS r
     LEFT JOIN arrived AS a ON r.callback_instance_id = a.callback_instance_id
 ),
 -- Of bursts there are far more pairs than waits: nothing may keep them all.
 together AS (
     SELECT
-        callback_instance_id, any_value(executor_id) AS executor_id,
-        meanwhile_callback_id AS callback_id, count(*) AS instances,
-        sum(overlap_ns)::BIGINT AS thread_ns, sum(certain_ns)::BIGINT AS certain_ns
+        callback_instance_id,
+        any_value(executor_id) AS executor_id,
+        meanwhile_callback_id AS callback_id,
+        count(*) AS instances,
+        sum(overlap_ns)::BIGINT AS thread_ns,
+        sum(certain_ns)::BIGINT AS certain_ns
     FROM derive.executor_meanwhile('ready')
     WHERE overlap_ns > 0
     GROUP BY callback_instance_id, meanwhile_callback_id

@@ -71,7 +71,8 @@ chain AS (
         row_number() OVER (ORDER BY run_id, publisher_id, subscription_id, route)
         - rank() OVER (ORDER BY run_id) + 1 AS number,
         NULL::BIGINT AS parent_number,
-        hop_id AS first_hop_id, hop_id, subscription_id, is_last,
+        hop_id AS first_hop_id,
+        hop_id, subscription_id, is_last,
         set_bit(nowhere, place, 1) AS visited,
         NULL::BIGINT AS parent_publishers_rank,
         dense_rank() OVER (ORDER BY run_id, publisher_id) AS publishers_rank,
@@ -92,7 +93,8 @@ chain AS (
         SELECT
             c.run_id,
             c.depth + 1 AS depth,
-            c.number AS parent_number, c.first_hop_id, u.hop_id, u.subscription_id, u.is_last,
+            c.number AS parent_number,
+            c.first_hop_id, u.hop_id, u.subscription_id, u.is_last,
             set_bit(c.visited, u.place, 1) AS visited,
             c.publishers_rank AS parent_publishers_rank,
             dense_rank() OVER (
@@ -121,7 +123,8 @@ list AS MATERIALIZED (
 ),
 around AS (
     SELECT
-        l.list_id, p.list_id AS parent_id,
+        l.list_id,
+        p.list_id AS parent_id,
         lead(l.list_id) OVER (
             PARTITION BY l.run_id, l.depth, l.parent_publishers_rank ORDER BY l.list_id
         ) AS next_id
@@ -132,15 +135,28 @@ around AS (
         AND l.parent_publishers_rank = p.publishers_rank
 ),
 walk (point, next_point, entered) USING KEY (point) AS (
-    SELECT 2 * a.list_id, coalesce(2 * c.child_id, 2 * a.list_id + 1), 1::BIGINT
+    SELECT
+        2 * a.list_id,
+        coalesce(2 * c.child_id, 2 * a.list_id + 1),
+        1::BIGINT
     FROM around AS a
     LEFT JOIN (
-        SELECT parent_id, min(list_id) AS child_id FROM around GROUP BY parent_id
+        SELECT
+            parent_id,
+            min(list_id) AS child_id
+        FROM around
+        GROUP BY parent_id
     ) AS c ON a.list_id = c.parent_id
     UNION ALL
-    SELECT 2 * list_id + 1, coalesce(2 * next_id, 2 * parent_id + 1), 0 FROM around
+    SELECT
+        2 * list_id + 1,
+        coalesce(2 * next_id, 2 * parent_id + 1),
+        0
+    FROM around
     UNION
-    SELECT w.point, n.next_point, w.entered + n.entered
+    SELECT
+        w.point, n.next_point,
+        w.entered + n.entered
     FROM walk AS w
     JOIN recurring.walk AS n ON w.next_point = n.point
 ),
@@ -169,7 +185,9 @@ continuable AS (
 ),
 limited AS (
     SELECT
-        n.run_id, n.path_id, p.path_id AS parent_path_id, n.depth, n.first_hop_id, n.hop_id,
+        n.run_id, n.path_id,
+        p.path_id AS parent_path_id,
+        n.depth, n.first_hop_id, n.hop_id,
         CASE WHEN to_topic IS NULL THEN e.number IS NOT NULL ELSE n.is_last END AS is_candidate,
         n.is_crowded OR c.number IS NOT NULL AS is_cut
     FROM numbered AS n
@@ -186,7 +204,9 @@ ranked AS (
 )
 SELECT
     r.run_id, r.path_id, r.parent_path_id, r.depth, u.publisher_id, u.subscription_id, u.route,
-    f.publisher_id AS first_publisher_id, f.route AS first_route, u.is_cached,
+    f.publisher_id AS first_publisher_id,
+    f.route AS first_route,
+    u.is_cached,
     r.is_candidate AND r.path_number <= max_paths AS is_path,
     CASE
         WHEN bool_or(r.is_candidate AND r.path_number > max_paths) OVER run THEN true

@@ -15,16 +15,27 @@
 --     of the request or response
 WITH moment AS (
     -- When each thing was: as a cause, and as an effect.
-    SELECT 'publication' AS kind, publication_id AS id, end_ns AS from_ns, start_ns AS to_ns
+    SELECT
+        'publication' AS kind,
+        publication_id AS id,
+        end_ns AS from_ns,
+        start_ns AS to_ns
     FROM main.publication
     UNION ALL
     SELECT 'take', take_id, taken_ns, taken_ns FROM main.take
     UNION ALL
     SELECT 'callback_instance', callback_instance_id, start_ns, start_ns FROM main.callback_instance
     UNION ALL
-    SELECT 'request', request_id, coalesce(taken_ns, sent_ns), sent_ns FROM main.request
+    SELECT
+        'request', request_id,
+        coalesce(taken_ns, sent_ns),
+        sent_ns
+    FROM main.request
     UNION ALL
-    SELECT 'response', response_id, taken_ns, coalesce(sent_ns, taken_ns) FROM main.response
+    SELECT
+        'response', response_id, taken_ns,
+        coalesce(sent_ns, taken_ns)
+    FROM main.response
 )
 SELECT l.run_id, l.from_kind, l.from_id, l.to_kind, l.to_id, l.link_kind, f.from_ns, t.to_ns
 FROM derive.flow_link AS l

@@ -39,7 +39,10 @@ called AS (
         ) AS label,
         s.node_id
     FROM (
-        SELECT route, unnest(route[2:]) AS service_id, unnest(range(2, len(route) + 1)) AS position
+        SELECT
+            route,
+            unnest(route[2:]) AS service_id,
+            unnest(range(2, len(route) + 1)) AS position
         FROM (SELECT DISTINCT route FROM chain)
     ) AS r
     LEFT JOIN store.service AS s ON r.service_id = s.service_id

@@ -71,7 +71,9 @@ aside AS MATERIALIZED (
     JOIN store.client AS c ON q.client_id = c.client_id
     WHERE c.is_internal AND NOT internal AND l.run_id IN (SELECT run_id FROM origin)
     UNION ALL
-    SELECT derive.vertex_key(l.from_kind, l.from_id), derive.vertex_key(l.to_kind, l.to_id)
+    SELECT
+        derive.vertex_key(l.from_kind, l.from_id),
+        derive.vertex_key(l.to_kind, l.to_id)
     FROM derive.certain_call AS l
     LEFT JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     LEFT JOIN store.request AS q ON l.request_id = q.request_id
@@ -88,7 +90,9 @@ link AS (
     WHERE run_id IN (SELECT run_id FROM origin)
 ),
 edge AS MATERIALIZED (
-    SELECT false AS is_backward, l.from_key, l.to_key
+    SELECT
+        false AS is_backward,
+        l.from_key, l.to_key
     FROM link AS l
     ANTI JOIN aside AS a ON l.to_key = a.key
     WHERE direction <> 'backward'
@@ -96,11 +100,16 @@ edge AS MATERIALIZED (
     SELECT true, to_key, from_key FROM link WHERE direction <> 'forward'
 ),
 near (is_backward, key, depth) USING KEY (is_backward, key) AS (
-    SELECT s.is_backward, derive.vertex_key(start_kind, start_id)::BIGINT, 0
+    SELECT
+        s.is_backward,
+        derive.vertex_key(start_kind, start_id)::BIGINT,
+        0
     FROM (VALUES (false), (true)) AS s (is_backward)
     CROSS JOIN origin AS o
     UNION
-    SELECT n.is_backward, e.to_key, min(n.depth) + 1
+    SELECT
+        n.is_backward, e.to_key,
+        min(n.depth) + 1
     FROM near AS n
     JOIN edge AS e ON n.is_backward = e.is_backward AND n.key = e.from_key
     ANTI JOIN recurring.near AS k ON n.is_backward = k.is_backward AND e.to_key = k.key
@@ -126,14 +135,18 @@ shown AS MATERIALIZED (
     WHERE direction = 'both' OR n.is_backward = (direction = 'backward')
 ),
 cut AS (
-    SELECT s.key, count(*) AS cut_count
+    SELECT
+        s.key,
+        count(*) AS cut_count
     FROM shown AS s
     JOIN edge AS e ON s.is_backward = e.is_backward AND s.key = e.from_key
     ANTI JOIN vertex AS v ON e.to_key = v.key
     GROUP BY s.key
 ),
 left_out AS (
-    SELECT s.key, count(*) AS internal_count
+    SELECT
+        s.key,
+        count(*) AS internal_count
     FROM aside AS a
     JOIN shown AS s ON a.from_key = s.key
     ANTI JOIN vertex AS v ON a.key = v.key
@@ -166,7 +179,8 @@ SELECT
     coalesce(lt.is_loss_affected, lc.is_loss_affected) AS is_loss_affected,
     d.kind, d.id, d.start_ns, d.end_ns, d.node, d.label, d.topic_name, d.symbol,
     printf('%s %d', coalesce(h.name, '?'), h.tid) AS thread,
-    m.hostname AS host, d.missing, d.reason,
+    m.hostname AS host,
+    d.missing, d.reason,
     coalesce(c.cut_count, 0) AS cut_count,
     coalesce(o.internal_count, 0) AS internal_count
 FROM described AS d

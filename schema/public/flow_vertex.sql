@@ -83,8 +83,9 @@ LEFT JOIN store.subscription AS s ON k.subscription_id = s.subscription_id
 WHERE v.kind = 'callback_instance'
 UNION ALL
 SELECT
-    v.key, v.kind, v.id, v.depth, q.run_id, coalesce(q.sent_ns, q.taken_ns), q.taken_ns,
-    q.thread_id, h.process_id,
+    v.key, v.kind, v.id, v.depth, q.run_id,
+    coalesce(q.sent_ns, q.taken_ns),
+    q.taken_ns, q.thread_id, h.process_id,
     CASE WHEN c.client_id IS NULL THEN '?' ELSE main.node_label(n.full_name, o.name, o.pid) END,
     coalesce(c.service_name, s.service_name, '?'),
     NULL, NULL,
@@ -98,7 +99,9 @@ FROM query_table(vertices) AS v
 JOIN (
     -- A message of a service is on the thread of the client, if that is known.
     SELECT
-        'request' AS kind, q.request_id AS id, q.run_id, q.sent_ns, q.taken_ns,
+        'request' AS kind,
+        q.request_id AS id,
+        q.run_id, q.sent_ns, q.taken_ns,
         coalesce(q.sender_thread_id, q.receiver_thread_id) AS thread_id,
         q.client_id, q.service_id,
         CASE
@@ -113,7 +116,8 @@ JOIN (
     UNION ALL
     SELECT
         'response', response_id, run_id, sent_ns, taken_ns,
-        coalesce(receiver_thread_id, sender_thread_id), client_id, service_id, NULL
+        coalesce(receiver_thread_id, sender_thread_id),
+        client_id, service_id, NULL
     FROM main.response
 ) AS q ON v.kind = q.kind AND v.id = q.id
 JOIN store.thread AS h ON q.thread_id = h.thread_id

@@ -11,7 +11,10 @@
 -- column: total_share
 CREATE OR REPLACE MACRO main.function_time(of_samples) AS TABLE
 WITH seen AS MATERIALIZED (
-    SELECT group_id, stack_id, count(*) AS samples, sum(cpu_ns)::BIGINT AS cpu_ns
+    SELECT
+        group_id, stack_id,
+        count(*) AS samples,
+        sum(cpu_ns)::BIGINT AS cpu_ns
     FROM query_table(of_samples)
     GROUP BY group_id, stack_id
 ),
@@ -21,7 +24,13 @@ within AS (
     FROM main.stack_call
     WHERE stack_id IN (SELECT stack_id FROM seen)
 ),
-whole AS (SELECT group_id, sum(samples) AS samples FROM seen GROUP BY group_id)
+whole AS (
+    SELECT
+        group_id,
+        sum(samples) AS samples
+    FROM seen
+    GROUP BY group_id
+)
 SELECT
     s.group_id, w.stack_frame_id,
     coalesce(sum(s.samples) FILTER (WHERE is_self), 0)::BIGINT AS self_samples,
@@ -32,7 +41,9 @@ SELECT
         AS self_share,
     round(sum(s.samples) / any_value(a.samples), 4) AS total_share
 FROM (
-    SELECT s.*, k.stack_frame_id AS self_id
+    SELECT
+        s.*,
+        k.stack_frame_id AS self_id
     FROM seen AS s
     JOIN main.stack AS k ON s.stack_id = k.stack_id
 ) AS s

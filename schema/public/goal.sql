@@ -45,13 +45,19 @@
 --     moments
 WITH server AS MATERIALIZED (
     SELECT
-        *, goal_object_id AS action_server_id, cancel_object_id AS cancel_service_id,
-        result_object_id AS result_service_id, feedback_object_id AS feedback_publisher_id,
+        *,
+        goal_object_id AS action_server_id,
+        cancel_object_id AS cancel_service_id,
+        result_object_id AS result_service_id,
+        feedback_object_id AS feedback_publisher_id,
         status_object_id AS status_publisher_id
     FROM derive.action_object('service', 'publisher')
 ),
 client AS MATERIALIZED (
-    SELECT *, goal_object_id AS action_client_id, result_object_id AS result_client_id
+    SELECT
+        *,
+        goal_object_id AS action_client_id,
+        result_object_id AS result_client_id
     FROM derive.action_object('client', 'subscription')
 ),
 answered AS MATERIALIZED (FROM derive.goal_answer('server')),
@@ -60,23 +66,37 @@ paired AS MATERIALIZED (FROM derive.goal_result('server', 'client', 'request')),
 span AS MATERIALIZED (FROM derive.goal_span('server', 'request', 'paired')),
 alone AS MATERIALIZED (FROM derive.goal_alone('span')),
 answer AS (
-    SELECT request_id, min(sent_ns) AS sent_ns, min(taken_ns) AS taken_ns
+    SELECT
+        request_id,
+        min(sent_ns) AS sent_ns,
+        min(taken_ns) AS taken_ns
     FROM main.response
     GROUP BY request_id
 ),
 result AS (
-    SELECT p.goal_id, p.request_id, q.sent_ns AS asked_ns, a.sent_ns, a.taken_ns
+    SELECT
+        p.goal_id, p.request_id,
+        q.sent_ns AS asked_ns,
+        a.sent_ns, a.taken_ns
     FROM paired AS p
     JOIN main.request AS q ON p.request_id = q.request_id
     LEFT JOIN answer AS a ON p.request_id = a.request_id
     WHERE p.candidate_count = 1
 ),
 possible AS (
-    SELECT goal_id, any_value(candidate_count) AS candidate_count FROM paired GROUP BY goal_id
+    SELECT
+        goal_id,
+        any_value(candidate_count) AS candidate_count
+    FROM paired
+    GROUP BY goal_id
 ),
 -- Feedback names no goal in the trace: it counts where the server has one goal alone.
 told AS (
-    SELECT a.goal_id, count(*) AS number, min(b.start_ns) AS first_ns, max(b.start_ns) AS last_ns
+    SELECT
+        a.goal_id,
+        count(*) AS number,
+        min(b.start_ns) AS first_ns,
+        max(b.start_ns) AS last_ns
     FROM store.publication AS f
     JOIN server AS s ON f.publisher_id = s.feedback_publisher_id
     ASOF JOIN alone AS a ON s.action_server_id = a.action_server_id AND f.start_ns >= a.at_ns
@@ -84,7 +104,10 @@ told AS (
     GROUP BY a.goal_id
 ),
 cancelled AS (
-    SELECT c.goal_id, min(q.sent_ns) AS asked_ns, min(b.start_ns) AS accepted_ns
+    SELECT
+        c.goal_id,
+        min(q.sent_ns) AS asked_ns,
+        min(b.start_ns) AS accepted_ns
     FROM derive.goal_cancel('server', 'alone') AS c
     JOIN main.request AS q ON c.request_id = q.request_id
     JOIN main.publication AS b ON c.publication_id = b.publication_id
@@ -92,8 +115,10 @@ cancelled AS (
 ),
 timed AS (
     SELECT
-        g.run_id, g.goal_id, g.action_name, g.action_client_id, g.action_server_id,
-        q.sent_ns, q.taken_ns, a.sent_ns AS answered_ns, a.taken_ns AS answer_taken_ns,
+        g.run_id, g.goal_id, g.action_name, g.action_client_id, g.action_server_id, q.sent_ns,
+        q.taken_ns,
+        a.sent_ns AS answered_ns,
+        a.taken_ns AS answer_taken_ns,
         -- A status that a thread publishes right after its answer is of that goal if no other one
         -- was open, and none was answered in between.
         coalesce(
@@ -108,14 +133,17 @@ timed AS (
                     THEN true
             END
         ) AS is_accepted,
-        r.asked_ns AS result_asked_ns, r.sent_ns AS result_sent_ns,
-        r.taken_ns AS result_taken_ns, r.request_id AS result_request_id,
+        r.asked_ns AS result_asked_ns,
+        r.sent_ns AS result_sent_ns,
+        r.taken_ns AS result_taken_ns,
+        r.request_id AS result_request_id,
         p.candidate_count AS result_candidate_count,
         CASE WHEN s.is_end_certain THEN coalesce(t.number, 0) END AS feedback_count,
         CASE WHEN NOT s.is_overlapping THEN t.first_ns END AS first_feedback_ns,
         CASE WHEN NOT s.is_overlapping THEN t.last_ns END AS last_feedback_ns,
         coalesce(s.is_overlapping, false) AS is_overlapping,
-        c.asked_ns AS cancel_asked_ns, c.accepted_ns AS cancel_accepted_ns
+        c.asked_ns AS cancel_asked_ns,
+        c.accepted_ns AS cancel_accepted_ns
     FROM request AS g
     JOIN main.request AS q ON g.goal_id = q.request_id
     LEFT JOIN answer AS a ON g.goal_id = a.request_id
@@ -127,9 +155,14 @@ timed AS (
 ),
 -- Where the client or the server of a goal is not known, each one of the action may be it.
 party AS (
-    SELECT run_id, action_name, action_client_id, NULL AS action_server_id, process_id FROM client
+    SELECT
+        run_id, action_name, action_client_id,
+        NULL AS action_server_id,
+        process_id
+    FROM client
     UNION ALL
-    SELECT run_id, action_name, NULL, action_server_id, process_id FROM server
+    SELECT run_id, action_name, NULL, action_server_id, process_id
+    FROM server
 ),
 torn AS (
     SELECT t.goal_id

@@ -21,7 +21,9 @@ corrected AS (
     JOIN trace_clock AS r ON self.received_trace_id = r.trace_id
 )
 SELECT
-    run_id, sent_trace_id, received_trace_id, from_ns AS sent_ns, to_ns AS received_ns,
+    run_id, sent_trace_id, received_trace_id,
+    from_ns AS sent_ns,
+    to_ns AS received_ns,
     to_ns - from_ns AS latency_ns,
     protocol, source_address, source_port, destination_address, destination_port, identification,
     sequence_number

@@ -8,7 +8,9 @@
 -- column: take_id
 CREATE OR REPLACE MACRO main.looped_arrival(runs, arrivals) AS TABLE
 WITH RECURSIVE arrival AS MATERIALIZED (
-    SELECT arrival[1] AS path_id, arrival[2] AS take_id
+    SELECT
+        arrival[1] AS path_id,
+        arrival[2] AS take_id
     FROM (SELECT unnest(arrivals::BIGINT[][]) AS arrival)
 ),
 sink AS MATERIALIZED (
@@ -18,7 +20,9 @@ sink AS MATERIALIZED (
 ),
 -- The steps of the graph are looked for only where the end of a path goes on.
 hop AS MATERIALIZED (
-    SELECT DISTINCT c.subscription_id AS from_subscription_id, t.subscription_id
+    SELECT DISTINCT
+        c.subscription_id AS from_subscription_id,
+        t.subscription_id
     FROM derive.continued_pair AS c
     JOIN (
         SELECT DISTINCT run_id, publisher_id, subscription_id FROM derive.flow_transport
@@ -52,12 +56,16 @@ member AS MATERIALIZED (
     FROM behind
 ),
 round AS MATERIALIZED (
-    SELECT DISTINCT a.subscription_id AS from_subscription_id, b.subscription_id
+    SELECT DISTINCT
+        a.subscription_id AS from_subscription_id,
+        b.subscription_id
     FROM member AS a
     JOIN member AS b ON a.sink_id = b.sink_id
 ),
 edge AS MATERIALIZED (
-    SELECT DISTINCT c.take_id AS from_take_id, t.take_id
+    SELECT DISTINCT
+        c.take_id AS from_take_id,
+        t.take_id
     FROM derive.flow_continuation AS c
     JOIN derive.flow_transport AS t ON c.publication_id = t.publication_id
     JOIN round AS r

@@ -7,10 +7,14 @@
 -- column: shares VARCHAR  What ran, the largest first
 CREATE OR REPLACE MACRO main.meanwhile_share(waited) AS TABLE
 WITH pair AS (
-    SELECT r.callback_id, k.alike_id AS meanwhile_id, sum(r.overlap_ns) AS overlap_ns
+    SELECT
+        r.callback_id,
+        k.alike_id AS meanwhile_id,
+        sum(r.overlap_ns) AS overlap_ns
     FROM (
         SELECT
-            callback_id, unnest(meanwhile_callback_ids) AS meanwhile_id,
+            callback_id,
+            unnest(meanwhile_callback_ids) AS meanwhile_id,
             unnest(meanwhile_ns) AS overlap_ns
         FROM query_table(waited)
     ) AS r

@@ -25,7 +25,8 @@ SELECT
         AS publisher,
     CASE WHEN t.take_id IS NOT NULL THEN main.node_label(n.full_name, p.name, p.pid) END
         AS subscriber,
-    b.start_ns AS published_ns, t.taken_ns, l.latency_ns, b.publication_id, l.candidate_count,
+    b.start_ns AS published_ns,
+    t.taken_ns, l.latency_ns, b.publication_id, l.candidate_count,
     coalesce(l.is_loss_affected, t.is_loss_affected, b.is_loss_affected) AS is_loss_affected,
     coalesce(
         s.is_internal, o.is_internal,

@@ -14,7 +14,9 @@ SELECT
     ) AS nodes
 FROM main.process AS p
 LEFT JOIN (
-    SELECT process_id, list(full_name ORDER BY node_id) AS names
+    SELECT
+        process_id,
+        list(full_name ORDER BY node_id) AS names
     FROM main.node
     WHERE full_name IS NOT NULL
     GROUP BY process_id

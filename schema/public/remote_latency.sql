@@ -17,12 +17,17 @@ WITH place AS (
 ),
 way AS (
     SELECT
-        l.run_id, l.publication_id, l.take_id, b.end_ns AS sent_ns, t.taken_ns,
-        f.host_id AS from_host_id, o.host_id AS to_host_id,
-        f.clock_id AS from_clock_id, o.clock_id AS to_clock_id,
+        l.run_id, l.publication_id, l.take_id,
+        b.end_ns AS sent_ns,
+        t.taken_ns,
+        f.host_id AS from_host_id,
+        o.host_id AS to_host_id,
+        f.clock_id AS from_clock_id,
+        o.clock_id AS to_clock_id,
         derive.corrected_ns(t.taken_ns, o) - derive.corrected_ns(b.end_ns, f) AS latency_ns,
         f.reference_clock_id = o.reference_clock_id AS is_comparable,
-        f.uncertainty_ns AS from_uncertainty_ns, o.uncertainty_ns AS to_uncertainty_ns
+        f.uncertainty_ns AS from_uncertainty_ns,
+        o.uncertainty_ns AS to_uncertainty_ns
     FROM store.link_transport AS l
     JOIN store.publication AS b ON l.publication_id = b.publication_id
     JOIN store.take AS t ON l.take_id = t.take_id

@@ -31,7 +31,8 @@ WITH RECURSIVE state AS MATERIALIZED (
             preempted_by_other_thread_id,
             CASE WHEN waker_kind = 'thread' THEN waker_other_thread_id END
         ) AS by_other_thread_id,
-        preempted_by_priority AS by_priority, is_loss_affected
+        preempted_by_priority AS by_priority,
+        is_loss_affected
     FROM main.thread_state
     WHERE list_contains(runs, run_id)
         AND end_ns > (SELECT min(from_ns) FROM query_table(intervals))
@@ -39,7 +40,8 @@ WITH RECURSIVE state AS MATERIALIZED (
 ),
 chain AS (
     SELECT
-        i.interval_id, 0::BIGINT AS wakers,
+        i.interval_id,
+        0::BIGINT AS wakers,
         greatest(s.start_ns, i.from_ns) AS from_ns,
         least(s.end_ns, i.to_ns) AS to_ns,
         s.*
@@ -47,7 +49,8 @@ chain AS (
     JOIN state AS s ON i.thread_id = s.thread_id AND s.end_ns > i.from_ns AND s.start_ns < i.to_ns
     UNION ALL
     SELECT
-        c.interval_id, c.wakers + 1,
+        c.interval_id,
+        c.wakers + 1,
         greatest(s.start_ns, c.from_ns),
         least(s.end_ns, c.to_ns),
         s.*
@@ -59,9 +62,14 @@ chain AS (
         AND c.wakers < max_wakers
 ),
 boundary AS (
-    SELECT interval_id, from_ns AS at_ns FROM query_table(intervals) WHERE to_ns > from_ns
+    SELECT
+        interval_id,
+        from_ns AS at_ns
+    FROM query_table(intervals)
+    WHERE to_ns > from_ns
     UNION
-    SELECT interval_id, from_ns FROM chain
+    SELECT interval_id, from_ns
+    FROM chain
     UNION
     SELECT c.interval_id, c.to_ns
     FROM chain AS c
@@ -70,7 +78,8 @@ boundary AS (
 ),
 piece AS MATERIALIZED (
     SELECT
-        i.interval_id, i.thread_id, b.at_ns AS from_ns,
+        i.interval_id, i.thread_id,
+        b.at_ns AS from_ns,
         coalesce(lead(b.at_ns) OVER (PARTITION BY i.interval_id ORDER BY b.at_ns), i.to_ns) AS to_ns
     FROM boundary AS b
     JOIN query_table(intervals) AS i ON b.interval_id = i.interval_id

@@ -8,14 +8,26 @@
 -- column: subscribers VARCHAR[]  Nodes that subscribe to it, likewise
 -- column: publisher_count, subscription_count, publication_count, take_count
 WITH published AS (
-    SELECT publisher_id, count(*) AS number FROM store.publication GROUP BY publisher_id
+    SELECT
+        publisher_id,
+        count(*) AS number
+    FROM store.publication
+    GROUP BY publisher_id
 ),
-taken AS (SELECT subscription_id, count(*) AS number FROM store.take GROUP BY subscription_id),
+taken AS (
+    SELECT
+        subscription_id,
+        count(*) AS number
+    FROM store.take
+    GROUP BY subscription_id
+),
 endpoint AS (
     SELECT
         e.run_id, e.topic_name, e.is_internal,
-        main.node_label(n.full_name, p.name, p.pid) AS publisher, NULL AS subscriber,
-        coalesce(m.number, 0) AS publications, 0 AS takes
+        main.node_label(n.full_name, p.name, p.pid) AS publisher,
+        NULL AS subscriber,
+        coalesce(m.number, 0) AS publications,
+        0 AS takes
     FROM store.publisher AS e
     JOIN store.process AS p ON e.process_id = p.process_id
     LEFT JOIN store.node AS n ON e.node_id = n.node_id
@@ -23,7 +35,9 @@ endpoint AS (
     UNION ALL
     SELECT
         e.run_id, e.topic_name, e.is_internal, NULL,
-        main.node_label(n.full_name, p.name, p.pid), 0, coalesce(m.number, 0)
+        main.node_label(n.full_name, p.name, p.pid),
+        0,
+        coalesce(m.number, 0)
     FROM store.subscription AS e
     JOIN store.process AS p ON e.process_id = p.process_id
     LEFT JOIN store.node AS n ON e.node_id = n.node_id

@@ -12,13 +12,17 @@
 -- column: entry VARCHAR  What an entry of a file of links knows the topic by
 CREATE OR REPLACE MACRO main.unnamed_topic(only_run) AS TABLE
 WITH published AS (
-    SELECT publisher_id, count(*) AS message_count
+    SELECT
+        publisher_id,
+        count(*) AS message_count
     FROM store.publication
     WHERE run_id = only_run
     GROUP BY publisher_id
 ),
 taken AS (
-    SELECT subscription_id, count(*) AS message_count
+    SELECT
+        subscription_id,
+        count(*) AS message_count
     FROM store.take
     WHERE run_id = only_run
     GROUP BY subscription_id

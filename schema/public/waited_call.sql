@@ -22,8 +22,10 @@ WITH call AS (
         coalesce(v.service_name, c.service_name, '?') AS service_name,
         main.node_label(n.full_name, r.name, r.pid) AS server,
         s.callback_instance_id AS server_instance_id,
-        q.sent_ns, q.taken_ns, coalesce(s.start_ns, q.taken_ns) AS start_ns,
-        a.sent_ns AS answered_ns, a.taken_ns AS returned_ns
+        q.sent_ns, q.taken_ns,
+        coalesce(s.start_ns, q.taken_ns) AS start_ns,
+        a.sent_ns AS answered_ns,
+        a.taken_ns AS returned_ns
     FROM main.link_request AS l
     JOIN main.request AS q ON l.request_id = q.request_id
     JOIN main.response AS a ON q.request_id = a.request_id

@@ -62,7 +62,6 @@ def test_parameters_for_runs_have_one_name(file: SqlFile) -> None:
         assert about_runs <= {"only_run", "runs", "run_a", "run_b"}
 
 
-@pytest.mark.xfail(reason="not laid out yet: python tests/support/sql_layout.py --fix")
 def test_expressions_have_lines_of_their_own() -> None:
     wrong = [f"{path}:{line}" for path in sql_paths() for line in wrong_lines(path.read_text())]
     assert not wrong, "python tests/support/sql_layout.py --fix"

@@ -4,7 +4,9 @@
 -- grain: one row per group of runs, measure, node and subject
 -- kind: inline
 WITH summed AS (
-    SELECT label_group, measure, node, subject, bucket, sum(count) AS number
+    SELECT
+        label_group, measure, node, subject, bucket,
+        sum(count) AS number
     FROM distribution
     GROUP BY label_group, measure, node, subject, bucket
 ),

@@ -56,7 +56,9 @@ reason AS (
             list(reason ORDER BY number DESC, reason), list(number ORDER BY number DESC, reason)
         ) AS reasons
     FROM (
-        SELECT label_group, path, reason, count(*) AS number
+        SELECT
+            label_group, path, reason,
+            count(*) AS number
         FROM flow
         WHERE status <> 'reached'
         GROUP BY label_group, path, reason

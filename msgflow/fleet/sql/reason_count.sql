@@ -4,7 +4,8 @@
 -- kind: inline
 WITH listed AS (
     SELECT
-        label_group, topic_name, subscriber, 'reasons' AS name,
+        label_group, topic_name, subscriber,
+        'reasons' AS name,
         unnest(map_entries(reasons)) AS entry
     FROM topics_delivery
     UNION ALL

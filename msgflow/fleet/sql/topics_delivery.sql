@@ -31,7 +31,10 @@ SELECT
     m.dropped, m.lost, m.not_connected, m.cut_by_recording, m.unknown,
     100.0::DOUBLE * m.delivered / nullif(m.delivered + m.dropped + m.lost, 0) AS delivered_percent,
     100.0::DOUBLE * m.lost / nullif(m.delivered + m.dropped + m.lost, 0) AS lost_percent,
-    m.orphans, r.numbers AS reasons, o.numbers AS orphan_reasons, m.is_internal
+    m.orphans,
+    r.numbers AS reasons,
+    o.numbers AS orphan_reasons,
+    m.is_internal
 FROM merged AS m
 LEFT JOIN reason_count AS r
     ON r.name = 'reasons' AND m.label_group = r.label_group

@@ -23,7 +23,8 @@
 SELECT
     i.run_id, r.row_key,
     0::UTINYINT AS kind,
-    i.callback_instance_id AS id, i.start_ns,
+    i.callback_instance_id AS id,
+    i.start_ns,
     coalesce(i.end_ns, i.start_ns) AS end_ns,
     (coalesce(i.is_loss_affected, false)::UTINYINT + 2 * (i.end_ns IS NULL)::UTINYINT
         + 4 * i.is_intra_process::UTINYINT + 8 * (i.depth > 1)::UTINYINT)::UTINYINT AS flags
@@ -31,35 +32,47 @@ FROM main.callback_instance AS i
 JOIN callback_row AS r ON i.callback_id = r.callback_id
 UNION ALL
 SELECT
-    run_id, coalesce(8 * publisher_id + 4, 8 * process_id + 7), 1, publication_id, start_ns, end_ns,
+    run_id,
+    coalesce(8 * publisher_id + 4, 8 * process_id + 7),
+    1, publication_id, start_ns, end_ns,
     coalesce(is_loss_affected, false)::UTINYINT
 FROM main.publication
 UNION ALL
 SELECT
-    run_id, coalesce(8 * subscription_id + 1, 8 * process_id + 7), 2, take_id, taken_ns, taken_ns,
+    run_id,
+    coalesce(8 * subscription_id + 1, 8 * process_id + 7),
+    2, take_id, taken_ns, taken_ns,
     coalesce(is_loss_affected, false)::UTINYINT
 FROM main.take
 UNION ALL
 SELECT
-    q.run_id, coalesce(8 * q.client_id + 3, 8 * q.service_id + 2, 8 * t.process_id + 7), 3,
-    q.request_id, coalesce(q.sent_ns, q.taken_ns), coalesce(q.taken_ns, q.sent_ns),
+    q.run_id,
+    coalesce(8 * q.client_id + 3, 8 * q.service_id + 2, 8 * t.process_id + 7),
+    3, q.request_id,
+    coalesce(q.sent_ns, q.taken_ns),
+    coalesce(q.taken_ns, q.sent_ns),
     (2 * (q.taken_ns IS NULL OR q.sent_ns IS NULL)::UTINYINT)::UTINYINT
 FROM main.request AS q
 JOIN main.thread AS t ON coalesce(q.sender_thread_id, q.receiver_thread_id) = t.thread_id
 UNION ALL
 SELECT
-    r.run_id, coalesce(8 * r.client_id + 3, 8 * r.service_id + 2, 8 * t.process_id + 7), 4,
-    r.response_id, coalesce(r.sent_ns, r.taken_ns), coalesce(r.taken_ns, r.sent_ns),
+    r.run_id,
+    coalesce(8 * r.client_id + 3, 8 * r.service_id + 2, 8 * t.process_id + 7),
+    4, r.response_id,
+    coalesce(r.sent_ns, r.taken_ns),
+    coalesce(r.taken_ns, r.sent_ns),
     (2 * (r.taken_ns IS NULL OR r.sent_ns IS NULL)::UTINYINT)::UTINYINT
 FROM main.response AS r
 JOIN main.thread AS t ON coalesce(r.receiver_thread_id, r.sender_thread_id) = t.thread_id
 UNION ALL
 SELECT
-    s.run_id, 8 * s.thread_id + 6,
+    s.run_id,
+    8 * s.thread_id + 6,
     CASE s.state WHEN 'wait' THEN 5 WHEN 'execute' THEN 7 ELSE
         -- It looked in vain, and looks again when it has the lock.
         CASE WHEN s.next_state = 'process' AND e.kind LIKE 'multi_threaded%' THEN 9 ELSE 6 END END,
-    coalesce(s.callback_instance_id, -1), s.start_ns,
+    coalesce(s.callback_instance_id, -1),
+    s.start_ns,
     CASE WHEN s.state = 'execute' THEN least(coalesce(s.end_ns, s.start_ns), i.end_ns)
         ELSE coalesce(s.end_ns, s.start_ns) END,
     (2 * (s.end_ns IS NULL)::UTINYINT)::UTINYINT
@@ -73,7 +86,9 @@ LEFT JOIN main.executor AS e ON s.executor_id = e.executor_id
 LEFT JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
 UNION ALL
 SELECT
-    s.run_id, 8 * s.thread_id + 6, CASE WHEN e.kind LIKE 'multi_threaded%' THEN 9 ELSE 6 END,
+    s.run_id,
+    8 * s.thread_id + 6,
+    CASE WHEN e.kind LIKE 'multi_threaded%' THEN 9 ELSE 6 END,
     s.callback_instance_id, i.end_ns, s.end_ns, 0
 FROM main.executor_state AS s
 JOIN main.executor AS e ON s.executor_id = e.executor_id
@@ -81,15 +96,20 @@ JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance
 WHERE s.state = 'execute' AND i.end_ns < s.end_ns
 UNION ALL
 SELECT
-    i.run_id, 8 * i.thread_id + 6, 7, i.callback_instance_id, i.start_ns,
-    coalesce(i.end_ns, i.start_ns), (2 * (i.end_ns IS NULL)::UTINYINT)::UTINYINT
+    i.run_id,
+    8 * i.thread_id + 6,
+    7, i.callback_instance_id, i.start_ns,
+    coalesce(i.end_ns, i.start_ns),
+    (2 * (i.end_ns IS NULL)::UTINYINT)::UTINYINT
 FROM main.callback_instance AS i
 WHERE i.depth = 1
     AND i.thread_id IN (FROM main.executor_thread SELECT thread_id)
     AND i.thread_id NOT IN (FROM main.executor_state SELECT thread_id)
 UNION ALL
 SELECT
-    u.run_id, r.row_key, 8, coalesce(u.callback_instance_id, -1), u.at_ns, u.at_ns,
+    u.run_id, r.row_key, 8,
+    coalesce(u.callback_instance_id, -1),
+    u.at_ns, u.at_ns,
     u.is_loss_affected::UTINYINT
 FROM main.user_event AS u
 LEFT JOIN main.callback_instance AS i ON u.callback_instance_id = i.callback_instance_id
@@ -98,11 +118,16 @@ JOIN event_row AS r
     ON u.process_id = r.process_id AND c.node_id IS NOT DISTINCT FROM r.node_id AND u.name = r.name
 UNION ALL
 SELECT
-    run_id, -4 * node_id - 1, CASE WHEN state = 'active' THEN 10 ELSE 11 END, -1, start_ns, end_ns, 0
+    run_id,
+    -4 * node_id - 1,
+    CASE WHEN state = 'active' THEN 10 ELSE 11 END,
+    -1, start_ns, end_ns, 0
 FROM main.node_state
 UNION ALL
 SELECT
-    d.run_id, 8 * d.subscription_id + 1, 12, d.publication_id, p.end_ns, p.end_ns,
+    d.run_id,
+    8 * d.subscription_id + 1,
+    12, d.publication_id, p.end_ns, p.end_ns,
     (CASE d.status WHEN 'dropped' THEN 16 WHEN 'lost' THEN 32 ELSE 0 END)::UTINYINT
 FROM main.stat_delivery AS d
 JOIN main.publication AS p ON d.publication_id = p.publication_id

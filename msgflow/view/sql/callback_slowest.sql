@@ -4,7 +4,10 @@
 -- column: start_at BIGINT [ns since origin]  When it began
 -- column: duration BIGINT [ns]  How long it ran
 -- column: callback_instance_id BIGINT  Identity of the callback instance
-SELECT start_ns - $origin_ns AS start_at, end_ns - start_ns AS duration, callback_instance_id
+SELECT
+    start_ns - $origin_ns AS start_at,
+    end_ns - start_ns AS duration,
+    callback_instance_id
 FROM main.callback_instance
 WHERE run_id = $run
     AND callback_id = $callback

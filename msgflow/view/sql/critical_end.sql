@@ -7,9 +7,13 @@
 -- column: to_topic VARCHAR  Topic of the last take
 -- column: take_id BIGINT  Identity of the take
 WITH reached AS MATERIALIZED (
-    SELECT kind, id, true AS is_effect FROM main.flow_forward($kind, $id)
+    SELECT
+        kind, id,
+        true AS is_effect
+    FROM main.flow_forward($kind, $id)
     UNION ALL
-    SELECT kind, id, false FROM main.flow_backward($kind, $id)
+    SELECT kind, id, false
+    FROM main.flow_backward($kind, $id)
 ),
 origin AS (
     SELECT p.topic_name
@@ -30,7 +34,10 @@ arrival AS (
     ORDER BY r.is_effect DESC, coalesce(i.end_ns, i.start_ns, t.taken_ns) DESC, t.take_id
     LIMIT 1
 )
-SELECT o.topic_name AS from_topic, a.topic_name AS to_topic, a.take_id
+SELECT
+    o.topic_name AS from_topic,
+    a.topic_name AS to_topic,
+    a.take_id
 FROM arrival AS a
 CROSS JOIN origin AS o
 ORDER BY a.take_id

@@ -8,7 +8,11 @@
 -- column: link_kind
 WITH held AS (SELECT kind, id FROM segment WHERE kind < 5),
 coded AS (
-    SELECT t.code AS to_kind, l.to_id, f.code AS from_kind, l.from_id, l.link_kind
+    SELECT
+        t.code AS to_kind,
+        l.to_id,
+        f.code AS from_kind,
+        l.from_id, l.link_kind
     FROM main.flow_edge AS l
     JOIN vertex_code AS f ON l.from_kind = f.name
     JOIN vertex_code AS t ON l.to_kind = t.name

@@ -7,7 +7,10 @@
 -- column: process_id BIGINT  Identity of the process
 -- column: node_id BIGINT  Identity of the node; NULL: none, or not known
 -- column: name VARCHAR  Provider and event
-SELECT u.run_id, -4 * min(u.user_event_id) AS row_key, u.process_id, c.node_id, u.name
+SELECT
+    u.run_id,
+    -4 * min(u.user_event_id) AS row_key,
+    u.process_id, c.node_id, u.name
 FROM main.user_event AS u
 LEFT JOIN main.callback_instance AS i ON u.callback_instance_id = i.callback_instance_id
 LEFT JOIN main.callback AS c ON i.callback_id = c.callback_id

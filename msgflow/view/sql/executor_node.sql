@@ -10,15 +10,19 @@ WITH ran AS (
     SELECT DISTINCT callback_id, thread_id FROM main.callback_instance WHERE run_id = $run
 ),
 member AS (
-    SELECT thread_id, min(executor_id) AS executor_id
+    SELECT
+        thread_id,
+        min(executor_id) AS executor_id
     FROM main.executor_thread
     WHERE run_id = $run
     GROUP BY thread_id
 )
 SELECT
-    l.node, h.hostname AS host,
+    l.node,
+    h.hostname AS host,
     printf('%s %d', coalesce(p.name, '?'), p.pid) AS process,
-    e.executor_id, e.kind AS executor_kind,
+    e.executor_id,
+    e.kind AS executor_kind,
     (SELECT count(*) FROM main.executor_thread AS x WHERE x.executor_id = e.executor_id)
         AS threads
 FROM ran AS r

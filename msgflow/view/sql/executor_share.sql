@@ -21,12 +21,16 @@ clipped AS (
     CROSS JOIN extent AS e
 ),
 cut AS (
-    SELECT *, unnest(range(begin_at // width, (end_at - 1) // width + 1)) AS bin FROM clipped
+    SELECT
+        *,
+        unnest(range(begin_at // width, (end_at - 1) // width + 1)) AS bin
+    FROM clipped
 )
 SELECT
     thread_id,
     $start_ns - $origin_ns + bin * width AS start_at,
-    width AS length, activity,
+    width AS length,
+    activity,
     sum(least(end_at, (bin + 1) * width) - greatest(begin_at, bin * width))::BIGINT AS busy
 FROM cut
 GROUP BY thread_id, bin, width, activity

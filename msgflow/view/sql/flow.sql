@@ -16,9 +16,14 @@
 -- column: link_kind
 -- column: vertex_count BIGINT  Vertices of the whole flow
 WITH reached AS MATERIALIZED (
-    SELECT kind, id, bool_or(is_effect) AS is_effect, bool_or(NOT is_effect) AS is_cause
+    SELECT
+        kind, id,
+        bool_or(is_effect) AS is_effect,
+        bool_or(NOT is_effect) AS is_cause
     FROM (
-        SELECT kind, id, true AS is_effect
+        SELECT
+            kind, id,
+            true AS is_effect
         FROM main.flow_forward($kind, $id, max_depth := $steps)
         WHERE $direction <> 'backward'
         UNION ALL
@@ -30,8 +35,9 @@ WITH reached AS MATERIALIZED (
 ),
 drawn AS MATERIALIZED (
     SELECT
-        c.name, c.code AS kind, r.id, r.is_effect, r.is_cause, b.row_key, b.start_ns, b.end_ns,
-        b.flags
+        c.name,
+        c.code AS kind,
+        r.id, r.is_effect, r.is_cause, b.row_key, b.start_ns, b.end_ns, b.flags
     FROM reached AS r
     JOIN vertex_code AS c ON r.kind = c.name
     JOIN bar AS b ON c.code = b.kind AND r.id = b.id
@@ -53,7 +59,9 @@ SELECT
     n.kind, n.id, n.row_key,
     n.start_ns - $origin_ns AS start_at,
     n.end_ns - n.start_ns AS length,
-    n.flags, n.is_effect, n.is_cause, c.code AS from_kind, l.from_id, l.link_kind,
+    n.flags, n.is_effect, n.is_cause,
+    c.code AS from_kind,
+    l.from_id, l.link_kind,
     (SELECT count(*) FROM reached) AS vertex_count
 FROM near AS n
 LEFT JOIN link AS l ON n.name = l.to_kind AND n.id = l.to_id

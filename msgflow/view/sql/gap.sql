@@ -9,7 +9,8 @@
 -- column: total BIGINT  Gaps of the run
 WITH longest AS (
     SELECT
-        h.hostname AS host, g.kind, g.start_ns, g.end_ns, g.event_count,
+        h.hostname AS host,
+        g.kind, g.start_ns, g.end_ns, g.event_count,
         count(*) OVER () AS total
     FROM main.gap AS g
     JOIN main.trace AS t ON g.trace_id = t.trace_id
@@ -19,6 +20,9 @@ WITH longest AS (
     LIMIT $limit
 )
 SELECT
-    host, kind, start_ns - $origin_ns AS start_at, end_ns - start_ns AS length, event_count, total
+    host, kind,
+    start_ns - $origin_ns AS start_at,
+    end_ns - start_ns AS length,
+    event_count, total
 FROM longest
 ORDER BY start_at, length, host, kind, event_count

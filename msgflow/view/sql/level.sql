@@ -18,8 +18,12 @@ WHERE run_id = $run
     AND id IS NOT NULL AND length >= $bin_ns
 UNION ALL
 SELECT
-    row_key, kind, NULL, $bin_ns * (start_at // $bin_ns), $bin_ns, bit_or(flags),
-    sum(count)::BIGINT, sum(busy)::BIGINT
+    row_key, kind, NULL,
+    $bin_ns * (start_at // $bin_ns),
+    $bin_ns,
+    bit_or(flags),
+    sum(count)::BIGINT,
+    sum(busy)::BIGINT
 FROM level
 WHERE run_id = $run
     AND start_at < $end_ns - $origin_ns AND start_at + length >= $start_ns - $origin_ns

@@ -20,7 +20,8 @@ WITH message AS (
         0::UTINYINT AS link_kind,
         8 * b.publisher_id + 4 AS from_row,
         8 * t.subscription_id + 1 AS to_row,
-        b.end_ns AS from_ns, t.taken_ns AS to_ns,
+        b.end_ns AS from_ns,
+        t.taken_ns AS to_ns,
         coalesce(l.is_loss_affected, false) AS is_loss_affected
     FROM main.link_transport AS l
     JOIN main.publication AS b ON l.publication_id = b.publication_id
@@ -52,7 +53,9 @@ cause AS (
             ELSE l.callback_instance_id <= $last_instance END
 )
 SELECT
-    link_kind, from_row, to_row, from_ns - $origin_ns AS from_at, to_ns - $origin_ns AS to_at,
+    link_kind, from_row, to_row,
+    from_ns - $origin_ns AS from_at,
+    to_ns - $origin_ns AS to_at,
     is_loss_affected
 FROM (FROM message UNION ALL FROM cause)
 WHERE from_row IS NOT NULL AND to_row IS NOT NULL

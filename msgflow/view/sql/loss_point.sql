@@ -9,7 +9,9 @@
 -- column: is_internal
 SELECT
     $start_ns - $origin_ns + (m.at_ns - $start_ns) // e.width * e.width AS start_at,
-    e.width AS length, s.topic_name AS topic, m.status, m.reason,
+    e.width AS length,
+    s.topic_name AS topic,
+    m.status, m.reason,
     count(*) AS count,
     coalesce(s.is_internal, false) AS is_internal
 FROM missing_side AS m

@@ -9,7 +9,10 @@
 -- column: status VARCHAR  As in stat_delivery; 'orphan': a take without a publication
 -- column: reason
 SELECT
-    d.run_id, b.start_ns AS at_ns, 'publication' AS kind, d.publication_id AS id,
+    d.run_id,
+    b.start_ns AS at_ns,
+    'publication' AS kind,
+    d.publication_id AS id,
     d.subscription_id, s.process_id, d.status, d.reason
 FROM main.stat_delivery AS d
 JOIN main.publication AS b ON d.publication_id = b.publication_id

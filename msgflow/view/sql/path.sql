@@ -14,11 +14,21 @@ WITH path AS MATERIALIZED (
 ),
 visited AS (
     SELECT v.path_id, b.process_id
-    FROM (SELECT path_id, unnest(publishers) AS publisher_id FROM path) AS v
+    FROM (
+        SELECT
+            path_id,
+            unnest(publishers) AS publisher_id
+        FROM path
+    ) AS v
     JOIN main.publisher AS b ON v.publisher_id = b.publisher_id
     UNION
     SELECT v.path_id, s.process_id
-    FROM (SELECT path_id, unnest(subscriptions) AS subscription_id FROM path) AS v
+    FROM (
+        SELECT
+            path_id,
+            unnest(subscriptions) AS subscription_id
+        FROM path
+    ) AS v
     JOIN main.subscription AS s ON v.subscription_id = s.subscription_id
 ),
 timed AS (

@@ -10,7 +10,10 @@
 -- column: status VARCHAR  As in flows
 -- column: is_loss_affected BOOLEAN  A gap of a trace lies in its time
 SELECT
-    path_id, root_kind, root_id, root_ns - $origin_ns AS root_at, take_id, latency_ns AS latency,
+    path_id, root_kind, root_id,
+    root_ns - $origin_ns AS root_at,
+    take_id,
+    latency_ns AS latency,
     status, is_loss_affected
 FROM main.end_to_end([$run], NULL, NULL, 'callback_start', 'callback_end', $start_ns, $end_ns)
 WHERE is_first IS NOT false

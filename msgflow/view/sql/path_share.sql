@@ -15,7 +15,9 @@ WITH ranked AS (
     FROM chosen_flow
     WHERE latency IS NOT NULL
 )
-SELECT max(position) / any_value(number)::DOUBLE AS share, max(latency) AS latency
+SELECT
+    max(position) / any_value(number)::DOUBLE AS share,
+    max(latency) AS latency
 FROM ranked
 GROUP BY (position * $steps - 1) // number
 ORDER BY share

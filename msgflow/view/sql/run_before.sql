@@ -5,7 +5,10 @@
 WITH known AS (SELECT DISTINCT run_id, full_name FROM main.node WHERE full_name IS NOT NULL),
 own AS (SELECT full_name FROM known WHERE run_id = $run),
 other AS (
-    SELECT k.run_id, count(*) AS nodes, count(o.full_name) AS common
+    SELECT
+        k.run_id,
+        count(*) AS nodes,
+        count(o.full_name) AS common
     FROM known AS k
     LEFT JOIN own AS o ON k.full_name = o.full_name
     WHERE k.run_id <> $run

@@ -13,5 +13,7 @@ FROM bar
 WHERE run_id = $run AND start_ns < $end_ns AND end_ns >= $start_ns
 UNION ALL
 SELECT
-    8 * thread_id + 6, CASE activity WHEN 'wait' THEN 5 ELSE 6 END, -1, start_ns, end_ns, 0
+    8 * thread_id + 6,
+    CASE activity WHEN 'wait' THEN 5 ELSE 6 END,
+    -1, start_ns, end_ns, 0
 FROM main.executor_pause([$run], $start_ns, $end_ns)

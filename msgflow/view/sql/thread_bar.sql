@@ -39,12 +39,15 @@ SELECT
 FROM main.thread_state
 UNION ALL
 SELECT
-    s.run_id, -4 * (8192 * p.host_id + s.cpu) - 3, CASE s.state WHEN 'running' THEN 13 ELSE 14 END,
+    s.run_id,
+    -4 * (8192 * p.host_id + s.cpu) - 3,
+    CASE s.state WHEN 'running' THEN 13 ELSE 14 END,
     CASE
         WHEN s.state = 'running' THEN 2 * s.thread_id
         ELSE coalesce(2 * s.preempted_by_thread_id, 2 * s.preempted_by_other_thread_id + 1, -1)
     END,
-    s.start_ns, s.end_ns, s.is_loss_affected::UTINYINT
+    s.start_ns, s.end_ns,
+    s.is_loss_affected::UTINYINT
 FROM main.thread_state AS s
 JOIN main.thread AS t ON s.thread_id = t.thread_id
 JOIN main.process AS p ON t.process_id = p.process_id

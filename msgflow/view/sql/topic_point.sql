@@ -9,7 +9,11 @@
 -- column: latency BIGINT [ns]  Longest latency of its takes
 -- column: take_id BIGINT  Take with the longest latency
 WITH happened AS (
-    SELECT b.start_ns AS at_ns, false AS is_take, NULL::BIGINT AS take_id, NULL::BIGINT AS latency
+    SELECT
+        b.start_ns AS at_ns,
+        false AS is_take,
+        NULL::BIGINT AS take_id,
+        NULL::BIGINT AS latency
     FROM main.publication AS b
     JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
     WHERE b.run_id = $run AND p.topic_name IS NOT DISTINCT FROM $topic

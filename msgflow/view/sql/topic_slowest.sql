@@ -8,7 +8,8 @@
 SELECT
     t.taken_ns - $origin_ns AS taken_at,
     main.node_label(n.full_name, p.name, p.pid) AS subscriber,
-    l.latency_ns AS latency, t.take_id
+    l.latency_ns AS latency,
+    t.take_id
 FROM main.take AS t
 JOIN main.link_transport AS l ON t.take_id = l.take_id
 JOIN main.subscription AS s ON t.subscription_id = s.subscription_id

@@ -15,7 +15,9 @@ WITH publisher AS (
     JOIN derive.process_clock AS c ON p.process_id = c.process_id
 ),
 published AS (
-    SELECT p.run_id, p.topic_name, count(*) AS number
+    SELECT
+        p.run_id, p.topic_name,
+        count(*) AS number
     FROM store.publication AS b
     JOIN publisher AS p ON b.publisher_id = p.publisher_id
     WHERE p.topic_name IS NOT NULL
@@ -30,13 +32,17 @@ subscription AS (
     WHERE NOT coalesce(s.is_inferred AND s.rmw_handle IS NULL, false)
 ),
 subscribed AS (
-    SELECT run_id, topic_name, count(*) AS number
+    SELECT
+        run_id, topic_name,
+        count(*) AS number
     FROM subscription
     WHERE topic_name IS NOT NULL
     GROUP BY run_id, topic_name
 ),
 delivered AS (
-    SELECT s.run_id, s.topic_name, count(*) AS number
+    SELECT
+        s.run_id, s.topic_name,
+        count(*) AS number
     FROM (
         SELECT DISTINCT publication_id, publisher_id, subscription_id
         FROM store.link_transport
@@ -48,7 +54,9 @@ delivered AS (
     GROUP BY s.run_id, s.topic_name
 ),
 not_judged AS (
-    SELECT p.run_id, p.topic_name, count(*) AS number
+    SELECT
+        p.run_id, p.topic_name,
+        count(*) AS number
     FROM derive.copied_pair AS c
     JOIN publisher AS p ON c.publisher_id = p.publisher_id
     JOIN subscription AS s ON c.subscription_id = s.subscription_id AND p.topic_name = s.topic_name
@@ -58,18 +66,38 @@ not_judged AS (
     GROUP BY p.run_id, p.topic_name
 ),
 undelivered AS (
-    SELECT s.run_id, s.topic_name, count(*) AS number
+    SELECT
+        s.run_id, s.topic_name,
+        count(*) AS number
     FROM store.undelivered AS u
     JOIN subscription AS s ON u.subscription_id = s.subscription_id
     GROUP BY s.run_id, s.topic_name
 ),
-taken AS (SELECT run_id, count(*) AS number FROM store.take GROUP BY run_id),
-linked AS (
-    SELECT run_id, count(DISTINCT take_id) AS number FROM store.link_transport GROUP BY run_id
+taken AS (
+    SELECT
+        run_id,
+        count(*) AS number
+    FROM store.take
+    GROUP BY run_id
 ),
-orphan AS (SELECT run_id, count(DISTINCT take_id) AS number FROM store.orphan_take GROUP BY run_id)
+linked AS (
+    SELECT
+        run_id,
+        count(DISTINCT take_id) AS number
+    FROM store.link_transport
+    GROUP BY run_id
+),
+orphan AS (
+    SELECT
+        run_id,
+        count(DISTINCT take_id) AS number
+    FROM store.orphan_take
+    GROUP BY run_id
+)
 SELECT
-    b.run_id, b.topic_name AS subject, 1 AS count,
+    b.run_id,
+    b.topic_name AS subject,
+    1 AS count,
     printf(
         '%d messages for subscriptions; %d delivered, or with a reason',
         b.number * s.number - coalesce(n.number, 0),

@@ -6,7 +6,9 @@
 -- grain: one row per run and table
 -- severity: error
 WITH repeated AS (
-    SELECT run_id, 'publication' AS subject
+    SELECT
+        run_id,
+        'publication' AS subject
     FROM store.publication
     GROUP BY run_id, publication_id
     HAVING count(*) > 1
@@ -27,6 +29,9 @@ WITH repeated AS (
     GROUP BY run_id, user_event_id
     HAVING count(*) > 1
 )
-SELECT run_id, subject, count(*) AS count, 'identities that several rows have' AS detail
+SELECT
+    run_id, subject,
+    count(*) AS count,
+    'identities that several rows have' AS detail
 FROM repeated
 GROUP BY run_id, subject

@@ -5,12 +5,23 @@
 -- grain: one row per run and table
 -- severity: error
 WITH reversed AS (
-    SELECT run_id, 'publication' AS subject FROM store.publication WHERE end_ns < start_ns
+    SELECT
+        run_id,
+        'publication' AS subject
+    FROM store.publication
+    WHERE end_ns < start_ns
     UNION ALL
-    SELECT run_id, 'callback_instance' FROM store.callback_instance WHERE end_ns < start_ns
+    SELECT run_id, 'callback_instance'
+    FROM store.callback_instance
+    WHERE end_ns < start_ns
     UNION ALL
-    SELECT run_id, 'executor_state' FROM derive.executor_interval WHERE end_ns < start_ns
+    SELECT run_id, 'executor_state'
+    FROM derive.executor_interval
+    WHERE end_ns < start_ns
 )
-SELECT run_id, subject, count(*) AS count, 'rows that end before they begin' AS detail
+SELECT
+    run_id, subject,
+    count(*) AS count,
+    'rows that end before they begin' AS detail
 FROM reversed
 GROUP BY run_id, subject

@@ -17,7 +17,9 @@ WITH call AS (
     FROM store.link_call
 ),
 wrong AS (
-    SELECT run_id, 'publications with several direct causes' AS detail
+    SELECT
+        run_id,
+        'publications with several direct causes' AS detail
     FROM store.link_causal
     WHERE kind = 'direct'
     GROUP BY run_id, publication_id
@@ -56,4 +58,9 @@ wrong AS (
     GROUP BY run_id, publication_id, request_id, response_id
     HAVING count(*) > 1
 )
-SELECT run_id, count(*) AS count, detail FROM wrong GROUP BY run_id, detail
+SELECT
+    run_id,
+    count(*) AS count,
+    detail
+FROM wrong
+GROUP BY run_id, detail

@@ -7,7 +7,9 @@
 -- severity: error
 -- param: broken STRUCT[]  Run, column, table it refers to, count; from `msgflow/db/finding.py`
 SELECT
-    broken.run_id, broken.child AS subject, broken.count,
+    broken.run_id,
+    broken.child AS subject,
+    broken.count,
     'identities that are no row of ' || broken.parent AS detail
 FROM (
     SELECT unnest(

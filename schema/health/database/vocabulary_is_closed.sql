@@ -5,7 +5,10 @@
 -- grain: one row per word that is not
 -- severity: error
 WITH foreign_word AS (
-    SELECT DISTINCT run_id, 'gap.kind' AS place, kind AS word
+    SELECT DISTINCT
+        run_id,
+        'gap.kind' AS place,
+        kind AS word
     FROM store.gap
     WHERE kind NOT IN ('loss', 'packets', 'pause')
     UNION ALL
@@ -84,4 +87,9 @@ WITH foreign_word AS (
     FROM store.finding
     WHERE name NOT IN (SELECT name FROM derive.finding_kind)
 )
-SELECT run_id, place AS subject, 1 AS count, printf('the word %s', word) AS detail FROM foreign_word
+SELECT
+    run_id,
+    place AS subject,
+    1 AS count,
+    printf('the word %s', word) AS detail
+FROM foreign_word

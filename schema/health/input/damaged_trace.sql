@@ -22,7 +22,10 @@ SELECT
 FROM damage
 WHERE number <= 20
 UNION ALL
-SELECT trace_index + 1, count(*), 'further damage of the same trace'
+SELECT
+    trace_index + 1,
+    count(*),
+    'further damage of the same trace'
 FROM damage
 WHERE number > 20
 GROUP BY trace_index

@@ -9,7 +9,9 @@
 -- grain: one row per trace
 -- severity: warning
 -- when: staging.trace WHERE event_count = 0
-SELECT trace_id, 1 AS count, 'no event was recorded' AS detail
+SELECT
+    trace_id, 1 AS count,
+    'no event was recorded' AS detail
 FROM staging.trace
 -- A chunk of a recording may well be empty, and of a copy nothing is read.
 WHERE event_count = 0

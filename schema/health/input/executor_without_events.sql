@@ -16,7 +16,9 @@ WITH enabled AS (
     SELECT trace_index FROM staging.declared WHERE name = 'ros2:rclcpp_executor_get_next_ready'
 ),
 silent AS (
-    SELECT p.process_id, p.thread_id, count(*) AS number
+    SELECT
+        p.process_id, p.thread_id,
+        count(*) AS number
     FROM staging.callback_run AS p
     SEMI JOIN enabled AS e ON p.trace_index = e.trace_index
     ANTI JOIN staging.executor_first AS x ON p.thread_id = x.thread_id
@@ -33,7 +35,9 @@ silent AS (
     HAVING count(*) > 1
 ),
 running AS (
-    SELECT process_id, count(DISTINCT thread_id) AS threads
+    SELECT
+        process_id,
+        count(DISTINCT thread_id) AS threads
     FROM staging.callback_run
     WHERE process_id IN (SELECT process_id FROM silent)
     GROUP BY process_id

@@ -7,7 +7,9 @@
 -- severity: warning
 -- when: staging.ignored
 WITH by_pattern AS (
-    SELECT i.place, i.pattern, sum(e.event_count)::BIGINT AS event_count
+    SELECT
+        i.place, i.pattern,
+        sum(e.event_count)::BIGINT AS event_count
     FROM staging.ignored AS i
     JOIN staging.event_count AS e ON i.event = e.name
     GROUP BY i.place, i.pattern

@@ -12,19 +12,35 @@
 --     staging.callback WHERE created_ns IS NULL, staging.client WHERE created_ns IS NULL,
 --     staging.service WHERE created_ns IS NULL
 WITH unseen AS (
-    SELECT 'nodes' AS kind, process_id FROM staging.node WHERE is_inferred
+    SELECT
+        'nodes' AS kind,
+        process_id
+    FROM staging.node
+    WHERE is_inferred
     UNION ALL
-    SELECT 'publishers', process_id FROM staging.publisher WHERE is_inferred AND NOT is_internal
+    SELECT 'publishers', process_id
+    FROM staging.publisher
+    WHERE is_inferred AND NOT is_internal
     UNION ALL
-    SELECT 'subscriptions', process_id FROM staging.subscription WHERE is_inferred
+    SELECT 'subscriptions', process_id
+    FROM staging.subscription
+    WHERE is_inferred
     UNION ALL
-    SELECT 'timers', process_id FROM staging.timer WHERE created_ns IS NULL
+    SELECT 'timers', process_id
+    FROM staging.timer
+    WHERE created_ns IS NULL
     UNION ALL
-    SELECT 'callbacks', process_id FROM staging.callback WHERE created_ns IS NULL
+    SELECT 'callbacks', process_id
+    FROM staging.callback
+    WHERE created_ns IS NULL
     UNION ALL
-    SELECT 'clients', process_id FROM staging.client WHERE created_ns IS NULL
+    SELECT 'clients', process_id
+    FROM staging.client
+    WHERE created_ns IS NULL
     UNION ALL
-    SELECT 'services', process_id FROM staging.service WHERE created_ns IS NULL
+    SELECT 'services', process_id
+    FROM staging.service
+    WHERE created_ns IS NULL
 )
 SELECT
     u.kind AS subject,

@@ -38,7 +38,13 @@ sent AS (
     ANTI JOIN rclcpp AS r ON p.process_id = r.process_id
     GROUP BY p.process_id
 ),
-timed AS (SELECT process_id, count(*) AS number FROM staging.timer GROUP BY process_id),
+timed AS (
+    SELECT
+        process_id,
+        count(*) AS number
+    FROM staging.timer
+    GROUP BY process_id
+),
 -- One of rclcpp that was there before the recording may only have logged. Of rclpy all processes
 -- have one name, so that only their nodes tell them apart.
 named AS (

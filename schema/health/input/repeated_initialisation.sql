@@ -8,7 +8,9 @@
 -- severity: info
 WITH initialised AS (
     SELECT
-        process_id, publisher_handle AS handle, topic_name,
+        process_id,
+        publisher_handle AS handle,
+        topic_name,
         lag(topic_name) OVER (
             PARTITION BY process_id, publisher_handle ORDER BY event_id
         ) AS previous_topic

@@ -7,12 +7,18 @@
 -- severity: info
 -- when: staging.stack_sample
 WITH sample AS (
-    SELECT f.file, x.is_cut, f.function = '[unknown]' AS is_unnamed
+    SELECT
+        f.file, x.is_cut,
+        f.function = '[unknown]' AS is_unnamed
     FROM staging.stack_sample AS s
     JOIN staging.stack AS k ON s.stack_id = k.stack_id
     JOIN staging.stack_frame AS f ON k.stack_frame_id = f.stack_frame_id
     JOIN (
-        SELECT calls, bool_and(is_cut) AS is_cut FROM staging.stack_text GROUP BY calls
+        SELECT
+            calls,
+            bool_and(is_cut) AS is_cut
+        FROM staging.stack_text
+        GROUP BY calls
     ) AS x ON k.calls = x.calls
 ),
 counted AS (
@@ -23,7 +29,9 @@ counted AS (
         mode(file) FILTER (WHERE is_unnamed) AS unnamed_file
     FROM sample
 )
-SELECT cut AS count, printf('%d of %d samples do not show all callers', cut, samples) AS detail
+SELECT
+    cut AS count,
+    printf('%d of %d samples do not show all callers', cut, samples) AS detail
 FROM counted
 WHERE cut >= 0.1 * greatest(samples, 1)
 UNION ALL

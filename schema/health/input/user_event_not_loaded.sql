@@ -23,7 +23,9 @@ WITH pattern AS (
 ),
 -- What the trace has instead.
 other AS (
-    SELECT e.name, sum(e.event_count)::BIGINT AS event_count
+    SELECT
+        e.name,
+        sum(e.event_count)::BIGINT AS event_count
     FROM staging.event_count AS e
     JOIN staging.source AS s ON e.trace_index = s.trace_index
     ANTI JOIN staging.ignored AS i ON e.name = i.event

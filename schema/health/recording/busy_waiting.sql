@@ -13,7 +13,10 @@
 -- severity: warning
 -- when: store.executor WHERE kind LIKE 'multi_threaded%'
 WITH waited AS (
-    SELECT s.run_id, s.executor_id, count(*) AS number, count(DISTINCT s.thread_id) AS threads
+    SELECT
+        s.run_id, s.executor_id,
+        count(*) AS number,
+        count(DISTINCT s.thread_id) AS threads
     FROM derive.executor_interval AS s
     SEMI JOIN (FROM store.executor WHERE kind LIKE 'multi_threaded%') AS e
         ON s.executor_id = e.executor_id
@@ -34,7 +37,9 @@ run AS (
     SELECT receiver_thread_id FROM store.response
 ),
 ran AS (
-    SELECT x.executor_id, count(*) AS number
+    SELECT
+        x.executor_id,
+        count(*) AS number
     FROM run AS i
     JOIN thread AS x ON i.thread_id = x.thread_id
     GROUP BY x.executor_id

@@ -3,8 +3,10 @@
 --     run together.
 -- grain: one row per pair of clocks
 SELECT
-    p.clock_id, p.other_clock_id, c.name, o.name AS other_name, p.received_count, p.sent_count,
-    p.received_packet_count, p.sent_packet_count, p.offset_ns, p.uncertainty_ns, p.is_even
+    p.clock_id, p.other_clock_id, c.name,
+    o.name AS other_name,
+    p.received_count, p.sent_count, p.received_packet_count, p.sent_packet_count, p.offset_ns,
+    p.uncertainty_ns, p.is_even
 FROM derive.clock_pair(
     (SELECT run_id FROM derive.clocks_to_synchronise WHERE run_id = $run_id)
 ) AS p

@@ -9,7 +9,9 @@
 -- severity: warning
 -- when: derive.clocks_to_synchronise
 WITH sync AS MATERIALIZED (
-    SELECT clock_id, coalesce(reference_clock_id, clock_id) AS reference_clock_id
+    SELECT
+        clock_id,
+        coalesce(reference_clock_id, clock_id) AS reference_clock_id
     FROM store.clock
     WHERE run_id = $run_id
 )

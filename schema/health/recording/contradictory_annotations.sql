@@ -19,7 +19,9 @@ SELECT
         ', ' ORDER BY s.topic_name, p.topic_name, c.subscription_id, c.publisher_id, c.kind
     ) AS detail
 FROM (
-    SELECT DISTINCT p.run_id, p.subscription_id, p.publisher_id, p.kind, s.kind AS other
+    SELECT DISTINCT
+        p.run_id, p.subscription_id, p.publisher_id, p.kind,
+        s.kind AS other
     FROM derive.declared_pair AS p
     JOIN derive.declared_pair AS s
         ON p.subscription_id = s.subscription_id AND p.publisher_id = s.publisher_id

@@ -13,7 +13,9 @@
 -- when: derive.unanswered_subscription
 WITH dead_end AS MATERIALIZED (FROM main.dead_end([$run_id])),
 input AS (
-    SELECT node_id, topic_name, sum(message_count)::BIGINT AS number
+    SELECT
+        node_id, topic_name,
+        sum(message_count)::BIGINT AS number
     FROM (
         SELECT DISTINCT node_id, subscription_id, topic_name, message_count
         FROM dead_end
@@ -22,9 +24,13 @@ input AS (
     GROUP BY node_id, topic_name
 ),
 output AS (
-    SELECT node_id, derive.names_in_words(published) AS published
+    SELECT
+        node_id,
+        derive.names_in_words(published) AS published
     FROM (
-        SELECT node_id, derive.names_in_words(output_topic) || ' ' || cause AS published
+        SELECT
+            node_id,
+            derive.names_in_words(output_topic) || ' ' || cause AS published
         FROM dead_end
         WHERE is_likely
         GROUP BY node_id, cause

@@ -29,7 +29,9 @@ loss AS (
 ),
 fullest AS (
     SELECT
-        trace_id, max(event_count) AS events, bool_or(discarded_event_count IS NULL) AS is_uncounted
+        trace_id,
+        max(event_count) AS events,
+        bool_or(discarded_event_count IS NULL) AS is_uncounted
     FROM store.packet
     GROUP BY trace_id
 ),

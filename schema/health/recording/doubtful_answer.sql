@@ -14,7 +14,9 @@
 -- when: store.link_causal WHERE kind = 'take_adjacent' AND candidate_count > 1
 WITH pair AS (
     SELECT
-        l.run_id, p.node_id, p.process_id, s.topic_name AS input, p.topic_name AS output,
+        l.run_id, p.node_id, p.process_id,
+        s.topic_name AS input,
+        p.topic_name AS output,
         count(*) AS link_count
     FROM store.link_causal AS l
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id

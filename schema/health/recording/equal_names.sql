@@ -10,7 +10,8 @@
 -- when: store.node WHERE contains(full_name, '@')
 WITH named AS (
     SELECT
-        run_id, main.node_name(full_name) AS node_name,
+        run_id,
+        main.node_name(full_name) AS node_name,
         list(DISTINCT split_part(full_name, '@', 2) ORDER BY split_part(full_name, '@', 2))
             AS places
     FROM store.node

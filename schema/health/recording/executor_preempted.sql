@@ -33,10 +33,18 @@ taken AS (
     WHERE s.state = 'preempted'
     GROUP BY ALL
 ),
-first AS (SELECT thread_id, arg_max(name, (length_ns, name)) AS name FROM taken GROUP BY thread_id),
+first AS (
+    SELECT
+        thread_id,
+        arg_max(name, (length_ns, name)) AS name
+    FROM taken
+    GROUP BY thread_id
+),
 -- The least urgent one that it ran with.
 priority AS (
-    SELECT thread_id, max(priority) AS priority
+    SELECT
+        thread_id,
+        max(priority) AS priority
     FROM main.thread_state
     WHERE state = 'running'
     GROUP BY thread_id

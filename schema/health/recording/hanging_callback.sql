@@ -15,10 +15,18 @@ WITH hanging AS MATERIALIZED (
     SELECT run_id, process_id, thread_id, callback_instance_id, callback_id, start_ns
     FROM derive.hanging_callback
 ),
-host_end AS (SELECT host_id, max(last_seen_ns) AS end_ns FROM store.process GROUP BY host_id),
+host_end AS (
+    SELECT
+        host_id,
+        max(last_seen_ns) AS end_ns
+    FROM store.process
+    GROUP BY host_id
+),
 usual AS (
     SELECT
-        callback_id, count(*) AS runs, max(end_ns - start_ns) AS longest_ns,
+        callback_id,
+        count(*) AS runs,
+        max(end_ns - start_ns) AS longest_ns,
         quantile_disc(end_ns - start_ns, 0.5) AS median_ns
     FROM store.callback_instance
     WHERE callback_id IN (SELECT callback_id FROM hanging) AND end_ns IS NOT NULL

@@ -8,17 +8,23 @@
 -- severity: warning
 -- when: store.thread_state
 WITH state AS (
-    SELECT run_id, count(*) AS states, count(*) FILTER (WHERE is_loss_affected) AS affected
+    SELECT
+        run_id,
+        count(*) AS states,
+        count(*) FILTER (WHERE is_loss_affected) AS affected
     FROM store.thread_state
     GROUP BY run_id
 ),
 callback AS (
-    SELECT run_id, count(*) FILTER (WHERE is_loss_affected) AS affected
+    SELECT
+        run_id,
+        count(*) FILTER (WHERE is_loss_affected) AS affected
     FROM store.callback_schedule
     GROUP BY run_id
 )
 SELECT
-    s.run_id, s.affected AS count,
+    s.run_id,
+    s.affected AS count,
     printf(
         '%d of %s of threads, %s', s.affected, derive.counted(s.states, 'state'),
         derive.counted(coalesce(c.affected, 0), 'callback instance')

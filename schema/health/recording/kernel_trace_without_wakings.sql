@@ -7,7 +7,10 @@
 -- grain: one row per run
 -- severity: info
 -- when: store.thread_state
-SELECT run_id, count(*) AS count, printf('%d sleeps, and nothing woke a thread', count(*)) AS detail
+SELECT
+    run_id,
+    count(*) AS count,
+    printf('%d sleeps, and nothing woke a thread', count(*)) AS detail
 FROM store.thread_state
 WHERE state IN ('sleeping', 'uninterruptible')
     AND run_id NOT IN (SELECT run_id FROM store.thread_state WHERE state = 'runnable')

@@ -29,7 +29,10 @@ WITH seen AS MATERIALIZED (
     FROM store.run
     WHERE run_id = $run_id
 )
-SELECT $run_id AS run_id, 'everything' AS layer, 1::BIGINT AS count,
+SELECT
+    $run_id AS run_id,
+    'everything' AS layer,
+    1::BIGINT AS count,
     'nothing was published or taken and no callback ran, as far as traced: no answers' AS detail
 FROM seen
 WHERE NOT (has_publications OR has_takes OR has_callbacks)
@@ -54,7 +57,9 @@ SELECT $run_id, 'executors', 1,
 FROM seen
 WHERE NOT (has_states OR is_without_executor) AND has_callbacks
 UNION ALL
-SELECT $run_id, 'requests', count(*),
+SELECT
+    $run_id, 'requests',
+    count(*),
     'callbacks of services ran ' || derive.counted(count(*), 'time')
     || ', and no request was seen (rmw_take_request and others, since Kilted): no calls, no flows '
     || 'through services'
@@ -65,7 +70,9 @@ WHERE i.run_id = $run_id AND c.kind = 'service'
 HAVING count(*) > 0
 UNION ALL
 -- Callbacks of action servers have no events.
-SELECT $run_id, 'goals', count(*),
+SELECT
+    $run_id, 'goals',
+    count(*),
     'action servers published their status ' || derive.counted(count(*), 'time')
     || ', and no request was seen (rmw_take_request and others, since Kilted): no goals, no flows '
     || 'through actions'

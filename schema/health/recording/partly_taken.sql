@@ -19,12 +19,16 @@ WITH pair AS (
     GROUP BY run_id, node_id, publishing_node_id, topic_name, subject
 ),
 taken AS (
-    SELECT publisher_id, subscription_id, count(*) AS number
+    SELECT
+        publisher_id, subscription_id,
+        count(*) AS number
     FROM store.link_transport
     GROUP BY publisher_id, subscription_id
 ),
 counted AS (
-    SELECT p.* EXCLUDE (pairs), sum(t.number)::BIGINT AS taken
+    SELECT
+        p.* EXCLUDE (pairs),
+        sum(t.number)::BIGINT AS taken
     FROM pair AS p
     JOIN taken AS t ON list_contains(p.pairs, (t.publisher_id, t.subscription_id))
     GROUP BY ALL

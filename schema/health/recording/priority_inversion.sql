@@ -29,11 +29,15 @@ asleep AS (
     WHERE u.state = 'sleeping' AND u.waker_kind = 'thread' AND i.end_ns >= u.end_ns
 ),
 delay AS (
-    SELECT run_id, thread_id, end_ns - start_ns AS length_ns
+    SELECT
+        run_id, thread_id,
+        end_ns - start_ns AS length_ns
     FROM urgent
     WHERE state = 'preempted' AND preempted_by_priority > priority
     UNION ALL
-    SELECT a.run_id, a.thread_id, sum(least(a.end_ns, w.end_ns) - greatest(a.start_ns, w.start_ns))
+    SELECT
+        a.run_id, a.thread_id,
+        sum(least(a.end_ns, w.end_ns) - greatest(a.start_ns, w.start_ns))
     FROM asleep AS a
     JOIN main.preemptor AS w
         ON a.waker_thread_id = w.thread_id AND w.start_ns < a.end_ns AND w.end_ns > a.start_ns

@@ -10,7 +10,9 @@
 -- severity: warning
 -- when: store.undelivered WHERE reason = 'subscription_ended' OR reason = 'reader_in_callback'
 WITH missed AS (
-    SELECT s.process_id, count(DISTINCT u.publication_id) AS number
+    SELECT
+        s.process_id,
+        count(DISTINCT u.publication_id) AS number
     FROM store.undelivered AS u
     JOIN store.subscription AS s ON u.subscription_id = s.subscription_id
     WHERE u.reason IN ('subscription_ended', 'reader_in_callback') AND NOT s.is_internal
@@ -18,12 +20,20 @@ WITH missed AS (
 ),
 -- What the middleware publishes for itself.
 announced AS (
-    SELECT process_id, max(end_ns) AS last_ns
+    SELECT
+        process_id,
+        max(end_ns) AS last_ns
     FROM store.publication
     WHERE publisher_id IS NULL AND rclcpp_ns IS NULL AND rcl_ns IS NULL AND rmw_ns IS NOT NULL
     GROUP BY process_id
 ),
-host_end AS (SELECT host_id, max(last_seen_ns) AS end_ns FROM store.process GROUP BY host_id)
+host_end AS (
+    SELECT
+        host_id,
+        max(last_seen_ns) AS end_ns
+    FROM store.process
+    GROUP BY host_id
+)
 SELECT
     p.run_id, p.process_id,
     m.number AS count,

@@ -9,12 +9,17 @@
 -- severity: info
 -- when: store.thread_state
 WITH life AS (
-    SELECT thread_id, min(start_ns) AS start_ns, max(end_ns) AS end_ns
+    SELECT
+        thread_id,
+        min(start_ns) AS start_ns,
+        max(end_ns) AS end_ns
     FROM main.thread_state
     GROUP BY thread_id
 ),
 ran AS (
-    SELECT s.run_id, s.thread_id, s.cpu, sum(s.end_ns - s.start_ns) AS length_ns
+    SELECT
+        s.run_id, s.thread_id, s.cpu,
+        sum(s.end_ns - s.start_ns) AS length_ns
     FROM main.thread_state AS s
     WHERE s.state = 'running'
         AND s.priority < 100

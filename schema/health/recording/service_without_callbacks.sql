@@ -8,7 +8,9 @@
 -- severity: info
 -- when: store.request WHERE callback_instance_id IS NULL
 WITH served AS (
-    SELECT process_id, service_id, count(*) AS number
+    SELECT
+        process_id, service_id,
+        count(*) AS number
     FROM (
         SELECT s.process_id, q.service_id, q.callback_instance_id
         FROM store.request AS q

@@ -10,7 +10,8 @@
 -- severity: warning
 -- when: derive.early_stream
 SELECT
-    run_id, path AS subject,
+    run_id,
+    path AS subject,
     count(*) AS count,
     printf(
         '%s (CPU %s) end up to %.3f s early',

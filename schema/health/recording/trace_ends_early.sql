@@ -9,7 +9,10 @@
 -- severity: warning
 -- when: store.orphan_take WHERE reason = 'publisher_trace_ends'
 WITH late AS (
-    SELECT o.run_id, s.topic_name, count(*) AS number, max(t.taken_ns) AS last_ns
+    SELECT
+        o.run_id, s.topic_name,
+        count(*) AS number,
+        max(t.taken_ns) AS last_ns
     FROM main.stat_orphan AS o
     JOIN main.take AS t ON o.take_id = t.take_id
     LEFT JOIN main.subscription AS s ON o.subscription_id = s.subscription_id
@@ -18,7 +21,8 @@ WITH late AS (
 ),
 sender AS (
     SELECT
-        b.run_id, b.topic_name, max(p.last_seen_ns) AS last_seen_ns,
+        b.run_id, b.topic_name,
+        max(p.last_seen_ns) AS last_seen_ns,
         string_agg(
             DISTINCT printf('%s %d on %s', coalesce(p.name, '?'), p.pid, h.hostname), ', '
         ) AS label

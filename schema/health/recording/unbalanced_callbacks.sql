@@ -19,7 +19,13 @@ near AS (
     FROM main.callback_instance
     WHERE thread_id IN (SELECT thread_id FROM unended)
 ),
-last AS (SELECT thread_id, max(start_ns) AS start_ns FROM near GROUP BY thread_id),
+last AS (
+    SELECT
+        thread_id,
+        max(start_ns) AS start_ns
+    FROM near
+    GROUP BY thread_id
+),
 open AS (
     SELECT u.*
     FROM unended AS u

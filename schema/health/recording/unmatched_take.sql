@@ -18,8 +18,10 @@ SELECT
     || string_agg(printf('%s (%d)', topic_name, number), ', ' ORDER BY topic_name) AS detail
 FROM (
     SELECT
-        o.run_id, t.trace_id, coalesce(s.topic_name, '?') AS topic_name,
-        t.source_timestamp_ns IS NULL AS has_no_stamp, count(*) AS number
+        o.run_id, t.trace_id,
+        coalesce(s.topic_name, '?') AS topic_name,
+        t.source_timestamp_ns IS NULL AS has_no_stamp,
+        count(*) AS number
     FROM store.orphan_take AS o
     JOIN store.take AS t ON o.take_id = t.take_id
     LEFT JOIN store.subscription AS s ON o.subscription_id = s.subscription_id

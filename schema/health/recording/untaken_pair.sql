@@ -3,7 +3,9 @@
 --     are, in words and by their ids, and how many messages.
 -- grain: one row per topic, publishing node, subscribing node and reason
 SELECT
-    u.run_id, u.reason, s.topic_name, p.node_id AS publishing_node_id, s.node_id,
+    u.run_id, u.reason, s.topic_name,
+    p.node_id AS publishing_node_id,
+    s.node_id,
     printf(
         '%s: %s (%s %d) → %s (%s %d)', s.topic_name,
         coalesce(pn.full_name, '?'), coalesce(pp.name, '?'), pp.pid,

@@ -7,13 +7,17 @@
 -- grain: one row per message of the bag
 -- reads: bag_read
 WITH sent AS (
-    SELECT b.publication_id, p.topic_name, coalesce(b.source_timestamp_ns, b.start_ns) AS sent_ns
+    SELECT
+        b.publication_id, p.topic_name,
+        coalesce(b.source_timestamp_ns, b.start_ns) AS sent_ns
     FROM main.publication AS b
     JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
     WHERE b.run_id = $run_id
 ),
 taken AS (
-    SELECT s.topic_name, t.taken_ns - b.start_ns AS after_ns
+    SELECT
+        s.topic_name,
+        t.taken_ns - b.start_ns AS after_ns
     FROM main.link_transport AS l
     JOIN main.publication AS b ON l.publication_id = b.publication_id
     JOIN main.take AS t ON l.take_id = t.take_id

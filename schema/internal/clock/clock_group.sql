@@ -3,7 +3,9 @@
 -- grain: one row per clock that others are corrected to, or that stands alone
 -- kind: inline
 WITH known AS (
-    SELECT clock_id, max(uncertainty_ns) AS greatest_ns
+    SELECT
+        clock_id,
+        max(uncertainty_ns) AS greatest_ns
     FROM main.clock_uncertainty
     GROUP BY clock_id
 ),

@@ -1,7 +1,10 @@
 -- description: How far times of several hosts can be compared, a sentence each.
 -- grain: one row per run whose clocks are not synchronised, then per clock that is corrected
 WITH known AS (
-    SELECT clock_id, min(uncertainty_ns) AS least_ns, max(uncertainty_ns) AS greatest_ns
+    SELECT
+        clock_id,
+        min(uncertainty_ns) AS least_ns,
+        max(uncertainty_ns) AS greatest_ns
     FROM main.clock_uncertainty
     GROUP BY clock_id
 ),

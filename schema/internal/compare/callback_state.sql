@@ -8,7 +8,9 @@
 -- column: run_queue HUGEINT  Waiting for one, ns
 -- column: blocked HUGEINT  Asleep, ns
 SELECT
-    l.node, l.label AS what, sum(s.running_ns) AS running,
+    l.node,
+    l.label AS what,
+    sum(s.running_ns) AS running,
     sum(s.preempted_ns + s.runnable_ns) AS run_queue,
     sum(s.sleeping_ns + s.uninterruptible_ns) AS blocked
 FROM main.callback_schedule AS s

@@ -19,9 +19,13 @@
 -- brief: path, difference_ns, share, node, part, what, a_mean_ns, b_mean_ns
 WITH state AS (
     UNPIVOT (
-        SELECT 'a' AS side, * FROM state_a
+        SELECT
+            'a' AS side,
+            *
+        FROM state_a
         UNION ALL
-        SELECT 'b', * FROM state_b
+        SELECT 'b', *
+        FROM state_b
     )
     ON running, run_queue, blocked INTO NAME state VALUE state_ns
 ),
@@ -34,12 +38,18 @@ spent AS (
 ),
 both_sides AS (
     SELECT
-        p.side, p.path, p.node, coalesce(s.state, p.part) AS part, p.what,
+        p.side, p.path, p.node,
+        coalesce(s.state, p.part) AS part,
+        p.what,
         p.total_ns * coalesce(s.share, 1) AS total_ns
     FROM (
-        SELECT 'a' AS side, path, node, part, what, total_ns FROM part_a
+        SELECT
+            'a' AS side,
+            path, node, part, what, total_ns
+        FROM part_a
         UNION ALL
-        SELECT 'b', path, node, part, what, total_ns FROM part_b
+        SELECT 'b', path, node, part, what, total_ns
+        FROM part_b
     ) AS p
     -- A part that only one of them can tell would look like a change.
     LEFT JOIN (FROM spent QUALIFY count(DISTINCT side) OVER (PARTITION BY node, what) = 2) AS s
@@ -55,11 +65,26 @@ part AS (
     WHERE c.statistic = 'mean' AND c.a_count > 0 AND c.b_count > 0
     GROUP BY s.path, s.node, s.part, s.what
 ),
-whole AS (SELECT path, sum(a_ns) AS a_ns, sum(b_ns) AS b_ns FROM part GROUP BY path),
+whole AS (
+    SELECT
+        path,
+        sum(a_ns) AS a_ns,
+        sum(b_ns) AS b_ns
+    FROM part
+    GROUP BY path
+),
 every AS (
-    SELECT path, NULL AS node, 'all' AS part, NULL AS what, a_ns, b_ns FROM whole
+    SELECT
+        path,
+        NULL AS node,
+        'all' AS part,
+        NULL AS what,
+        a_ns, b_ns
+    FROM whole
     UNION ALL
-    SELECT path, node, part, what, a_ns, b_ns FROM part WHERE a_ns <> 0 OR b_ns <> 0
+    SELECT path, node, part, what, a_ns, b_ns
+    FROM part
+    WHERE a_ns <> 0 OR b_ns <> 0
 )
 SELECT
     round(e.b_ns - e.a_ns)::BIGINT AS difference_ns,

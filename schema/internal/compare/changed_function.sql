@@ -4,7 +4,10 @@
 -- grain: one row per callback and function, the greatest difference first
 -- param: run_a, run_b, at_least, skip_first, a_window, b_window
 WITH instance AS (
-    SELECT side = 'a' AS is_a, node, label, callback_instance_id FROM compared_instance
+    SELECT
+        side = 'a' AS is_a,
+        node, label, callback_instance_id
+    FROM compared_instance
 ),
 sample AS (
     SELECT i.is_a, i.node, i.label, f.function, s.cpu_ns
@@ -41,7 +44,11 @@ compared AS (
     GROUP BY c.node, c.label, s.function
 )
 SELECT
-    node, label AS callback, function, round(a_ns)::BIGINT AS a_ns, round(b_ns)::BIGINT AS b_ns,
+    node,
+    label AS callback,
+    function,
+    round(a_ns)::BIGINT AS a_ns,
+    round(b_ns)::BIGINT AS b_ns,
     a_samples, b_samples
 FROM compared
 WHERE abs(b_ns - a_ns) > greatest(chance_ns, $at_least * a_ns)

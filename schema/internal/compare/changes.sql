@@ -52,11 +52,20 @@ SELECT
         ELSE m.verdict
     END AS change,
     coalesce(s.differing, s.alike, s.estimated) AS of,
-    m.a_ns AS a_median_ns, m.b_ns AS b_median_ns, m.change_percent AS median_percent,
-    m.verdict AS median_verdict, p.a_ns AS a_p95_ns, p.b_ns AS b_p95_ns,
-    p.change_percent AS p95_percent, p.verdict AS p95_verdict, l.a_ns AS a_max_ns,
-    l.b_ns AS b_max_ns, l.change_percent AS max_percent, l.verdict AS max_verdict,
-    m.a_share, m.b_share, m.a_count, m.b_count, m.a_ambiguous, m.b_ambiguous, s.subject AS path
+    m.a_ns AS a_median_ns,
+    m.b_ns AS b_median_ns,
+    m.change_percent AS median_percent,
+    m.verdict AS median_verdict,
+    p.a_ns AS a_p95_ns,
+    p.b_ns AS b_p95_ns,
+    p.change_percent AS p95_percent,
+    p.verdict AS p95_verdict,
+    l.a_ns AS a_max_ns,
+    l.b_ns AS b_max_ns,
+    l.change_percent AS max_percent,
+    l.verdict AS max_verdict,
+    m.a_share, m.b_share, m.a_count, m.b_count, m.a_ambiguous, m.b_ambiguous,
+    s.subject AS path
 FROM subject AS s
 LEFT JOIN compared AS m ON s.subject = m.subject AND m.statistic = 'median'
 LEFT JOIN compared AS p ON s.subject = p.subject AND p.statistic = 'p95'

@@ -10,8 +10,9 @@ WITH path_chain AS MATERIALIZED (
     FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths)
 )
 SELECT
-    e.run_id::VARCHAR AS run, p.path, e.status, e.latency_ns, e.is_first, e.is_last, e.is_newest,
-    e.is_loss_affected, e.is_ambiguous, p.is_cut
+    e.run_id::VARCHAR AS run,
+    p.path, e.status, e.latency_ns, e.is_first, e.is_last, e.is_newest, e.is_loss_affected,
+    e.is_ambiguous, p.is_cut
 FROM main.end_to_end($runs, $from, $to, chains := 'path_chain') AS e
 JOIN main.flow_path($runs, only_paths := true, chains := 'path_chain') AS p ON e.path_id = p.path_id
 JOIN main.run AS r ON e.run_id = r.run_id

@@ -4,23 +4,31 @@
 -- reads: compared
 -- param: run_a, run_b, what
 WITH lost AS (
-    SELECT run_id, coalesce(sum(discarded_event_count), 0)::BIGINT AS events
+    SELECT
+        run_id,
+        coalesce(sum(discarded_event_count), 0)::BIGINT AS events
     FROM main.trace
     WHERE run_id IN ($run_a, $run_b)
     GROUP BY run_id
 ),
 affected AS (
-    SELECT 'A' AS side, $run_a AS run_id, coalesce(sum(a_loss_affected), 0)::BIGINT AS number
+    SELECT
+        'A' AS side,
+        $run_a AS run_id,
+        coalesce(sum(a_loss_affected), 0)::BIGINT AS number
     FROM compared
     WHERE statistic = 'median'
     UNION ALL
-    SELECT 'B', $run_b, coalesce(sum(b_loss_affected), 0)::BIGINT
+    SELECT
+        'B', $run_b,
+        coalesce(sum(b_loss_affected), 0)::BIGINT
     FROM compared
     WHERE statistic = 'median'
 ),
 note AS (
     SELECT
-        1 AS place, NULL AS side,
+        1 AS place,
+        NULL AS side,
         'paths beyond the limits are left out; --max-paths and --max-depth raise them, --from and'
         ' --to choose' AS sentence
     WHERE EXISTS (FROM compared WHERE is_cut)

@@ -5,15 +5,23 @@
 -- reads: compared, condition
 WITH measured AS (
     SELECT
-        c.place, c.text, c.statistic = 'share' AS is_share, c.is_relative, c.allowed,
-        r.place AS row_place, r.subject, r.verdict, r.a_ns, r.b_ns, r.a_share, r.b_share,
+        c.place, c.text,
+        c.statistic = 'share' AS is_share,
+        c.is_relative, c.allowed,
+        r.place AS row_place,
+        r.subject, r.verdict, r.a_ns, r.b_ns, r.a_share, r.b_share,
         r.b_ns - r.a_ns AS more_ns,
         -- Shares have four digits.
         round(100 * (r.a_share - r.b_share), 2) AS points,
         format('{:.6g} ms', r.a_ns / 1e6) AS a_text,
         format('{:.6g} ms', r.b_ns / 1e6) AS b_text
     FROM condition AS c
-    JOIN (SELECT *, row_number() OVER () AS place FROM compared) AS r
+    JOIN (
+        SELECT
+            *,
+            row_number() OVER () AS place
+        FROM compared
+    ) AS r
         ON r.statistic = if(c.statistic = 'share', 'median', c.statistic)
 ),
 judged AS (
@@ -47,6 +55,10 @@ judged AS (
         ELSE a_ns < 0 OR coalesce(100e0 * more_ns > allowed * a_ns, true)
     END
 )
-SELECT text AS condition, subject, reason || coalesce(chance, '') AS reason, a_text
+SELECT
+    text AS condition,
+    subject,
+    reason || coalesce(chance, '') AS reason,
+    a_text
 FROM judged
 ORDER BY place, row_place

@@ -39,7 +39,9 @@
 -- column: subject VARCHAR  Nodes and topics of the path
 WITH of_run AS (
     -- Statistics that a run has flows enough for; who has them for p99 has them for all others.
-    SELECT side, subject, unit, run, count(*) FILTER (is_enough) AS depth
+    SELECT
+        side, subject, unit, run,
+        count(*) FILTER (is_enough) AS depth
     FROM measured
     WHERE value_ns IS NOT NULL
     GROUP BY side, subject, unit, run
@@ -55,7 +57,9 @@ allowing AS (
     GROUP BY r.side, r.subject, w.depth
 ),
 wanted AS (
-    SELECT subject, max(depth) AS depth
+    SELECT
+        subject,
+        max(depth) AS depth
     FROM (
         SELECT subject, depth
         FROM allowing
@@ -89,7 +93,9 @@ of_side AS (
     GROUP BY side, subject, statistic
 ),
 unit AS (
-    SELECT side, unit, subject, statistic, median(value_ns) AS value_ns
+    SELECT
+        side, unit, subject, statistic,
+        median(value_ns) AS value_ns
     FROM measured
     JOIN counted USING (side, subject, run)
     GROUP BY side, unit, subject, statistic
@@ -127,7 +133,8 @@ centre AS (
 ),
 known AS (
     SELECT
-        *, round(CASE WHEN is_log THEN exp(centre) ELSE centre END)::BIGINT AS value_ns
+        *,
+        round(CASE WHEN is_log THEN exp(centre) ELSE centre END)::BIGINT AS value_ns
     FROM of_side
     LEFT JOIN centre USING (side, subject, statistic)
 ),

@@ -14,16 +14,25 @@ WITH instance AS (
     WHERE list_contains($runs, run_id)
 ),
 of_callback AS (
-    SELECT run_id, 'callback_duration' AS measure, callback_id, duration_ns AS time_ns FROM instance
+    SELECT
+        run_id,
+        'callback_duration' AS measure,
+        callback_id,
+        duration_ns AS time_ns
+    FROM instance
     UNION ALL
-    SELECT run_id, 'callback_period', callback_id, period_ns FROM instance
+    SELECT run_id, 'callback_period', callback_id, period_ns
+    FROM instance
     UNION ALL
     SELECT run_id, 'callback_wait', callback_id, wait_ns
     FROM main.executor_wait
     WHERE list_contains($runs, run_id)
 ),
 measured AS (
-    SELECT m.run_id, m.measure, l.node, l.label AS subject, l.is_internal, m.time_ns
+    SELECT
+        m.run_id, m.measure, l.node,
+        l.label AS subject,
+        l.is_internal, m.time_ns
     FROM of_callback AS m
     JOIN main.callback_label AS l ON m.callback_id = l.callback_id
     UNION ALL

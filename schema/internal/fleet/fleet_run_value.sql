@@ -5,10 +5,17 @@
 -- reads: e2e_latency, flow, sided
 -- param: case VARCHAR  'first' or 'last' arrival of each root, 'newest' root of each arrival, or
 --     'every_pair'
-WITH cut AS (SELECT run, bool_or(is_cut) AS is_cut FROM e2e_latency GROUP BY run),
+WITH cut AS (
+    SELECT
+        run,
+        bool_or(is_cut) AS is_cut
+    FROM e2e_latency
+    GROUP BY run
+),
 measured AS (
     SELECT
-        s.side, s.unit, f.run, f.path AS subject,
+        s.side, s.unit, f.run,
+        f.path AS subject,
         count(value_ns) AS number,
         quantile_disc(value_ns, [0.5, 0.95, 0.99]) AS quantiles,
         avg(value_ns) AS mean_ns,

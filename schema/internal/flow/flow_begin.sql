@@ -10,7 +10,9 @@
 -- column: last_ns BIGINT [epoch ns]  When the last one began
 WITH named AS (
     SELECT
-        'publication' AS kind, b.publication_id AS id, b.start_ns,
+        'publication' AS kind,
+        b.publication_id AS id,
+        b.start_ns,
         p.topic_name = $place AS is_topic
     FROM main.publication AS b
     JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
@@ -35,7 +37,9 @@ found AS (
     UNION ALL
     SELECT NULL, NULL, NULL
 )
-SELECT kind, id, (SELECT max(start_ns) FROM meant) AS last_ns
+SELECT
+    kind, id,
+    (SELECT max(start_ns) FROM meant) AS last_ns
 FROM found
 ORDER BY start_ns NULLS LAST, kind DESC, id
 LIMIT 1

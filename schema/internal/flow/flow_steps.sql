@@ -30,19 +30,25 @@ sent AS (
     WHERE publication_id IN (SELECT id FROM step WHERE kind = 'publication')
 ),
 next AS (
-    SELECT run_id, thread_id, start_event_id AS event_id, start_ns AS at_ns FROM store.publication
+    SELECT
+        run_id, thread_id,
+        start_event_id AS event_id,
+        start_ns AS at_ns
+    FROM store.publication
     UNION ALL
     SELECT run_id, thread_id, start_event_id, taken_ns
     FROM store.take
     WHERE start_event_id IS NOT NULL
     UNION ALL
-    SELECT run_id, thread_id, start_event_id, start_ns FROM store.callback_instance
+    SELECT run_id, thread_id, start_event_id, start_ns
+    FROM store.callback_instance
     UNION ALL
     SELECT run_id, thread_id, end_event_id, end_ns
     FROM store.callback_instance
     WHERE end_event_id IS NOT NULL
     UNION ALL
-    SELECT run_id, thread_id, start_event_id, start_ns FROM store.executor_state
+    SELECT run_id, thread_id, start_event_id, start_ns
+    FROM store.executor_state
 ),
 went_on AS (
     SELECT
@@ -63,7 +69,9 @@ went_on AS (
 ),
 named AS (
     SELECT
-        callback_instance_id, name, count(*) AS event_count, min(at_ns) AS first_ns,
+        callback_instance_id, name,
+        count(*) AS event_count,
+        min(at_ns) AS first_ns,
         min(user_event_id) AS first_id
     FROM main.user_event
     WHERE callback_instance_id IN (SELECT id FROM step WHERE kind = 'callback_instance')
@@ -81,9 +89,13 @@ happened AS (
 ),
 -- Callbacks of one subscription lead on, or none does.
 ended AS (
-    SELECT d.subscription_id, derive.names_in_words(d.published) AS published
+    SELECT
+        d.subscription_id,
+        derive.names_in_words(d.published) AS published
     FROM (
-        SELECT subscription_id, derive.names_in_words(output_topic) || ' ' || cause AS published
+        SELECT
+            subscription_id,
+            derive.names_in_words(output_topic) || ' ' || cause AS published
         FROM main.dead_end([$run_id])
         WHERE NOT is_loop
         GROUP BY subscription_id, cause
@@ -113,11 +125,12 @@ called AS (
         AND callback_instance_id IN (SELECT id FROM step WHERE kind = 'callback_instance')
     GROUP BY callback_instance_id
 )
-SELECT s.run_id, s.kind, s.id, s.depth, s.start_ns, s.end_ns, s.node, s.label, s.topic_name,
-    s.symbol, s.thread, s.host, w.busy_min_ns, w.busy_max_ns, u.until_ns, v.user_events,
-    o.published AS otherwise_published, y.calls, s.missing, s.reason, s.cut_count,
-    s.internal_count, s.from_kind, s.from_id, s.link_kind, s.wait_ns, k.stored_ns,
-    s.candidate_count, s.is_loss_affected
+SELECT
+    s.run_id, s.kind, s.id, s.depth, s.start_ns, s.end_ns, s.node, s.label, s.topic_name, s.symbol,
+    s.thread, s.host, w.busy_min_ns, w.busy_max_ns, u.until_ns, v.user_events,
+    o.published AS otherwise_published,
+    y.calls, s.missing, s.reason, s.cut_count, s.internal_count, s.from_kind, s.from_id,
+    s.link_kind, s.wait_ns, k.stored_ns, s.candidate_count, s.is_loss_affected
 FROM step AS s
 LEFT JOIN (
     SELECT callback_instance_id, busy_min_ns, busy_max_ns

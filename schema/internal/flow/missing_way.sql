@@ -9,7 +9,8 @@ WITH RECURSIVE start_place AS MATERIALIZED (FROM derive.place($runs, $from)),
 end_place AS MATERIALIZED (FROM derive.place($runs, $to)),
 hop AS MATERIALIZED (
     SELECT
-        h.from_subscription_id, h.subscription_id, h.is_source, p.node_id AS publishing_id,
+        h.from_subscription_id, h.subscription_id, h.is_source,
+        p.node_id AS publishing_id,
         h.from_subscription_id IS NULL
         AND (
             (p.topic_name IN (SELECT topic_name FROM start_place)) IS true

@@ -2,7 +2,12 @@
 -- grain: one row per node
 -- reads: breakdown
 -- param: path VARCHAR  The path
-WITH part AS (SELECT *, row_number() OVER () AS place FROM breakdown),
+WITH part AS (
+    SELECT
+        *,
+        row_number() OVER () AS place
+    FROM breakdown
+),
 longest AS (
     SELECT
         *,
@@ -13,8 +18,10 @@ longest AS (
     WHERE path = $path
 )
 SELECT
-    node, coalesce(node_share, 0) AS share, node_ns::BIGINT AS total_ns, part, what, median_ns,
-    max_ns
+    node,
+    coalesce(node_share, 0) AS share,
+    node_ns::BIGINT AS total_ns,
+    part, what, median_ns, max_ns
 FROM longest
 WHERE is_longest
 ORDER BY total_ns DESC, node

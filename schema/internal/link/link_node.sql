@@ -3,7 +3,8 @@
 -- grain: one row per node with a name
 WITH ends AS (
     SELECT
-        node_id, 'subscription' AS kind,
+        node_id,
+        'subscription' AS kind,
         {'id': subscription_id, 'topic': topic_name, 'is_internal': is_internal} AS endpoint
     FROM main.subscription
     WHERE run_id = $run_id AND topic_name IS NOT NULL
@@ -17,7 +18,10 @@ WITH ends AS (
 SELECT
     list(e.endpoint ORDER BY e.endpoint.id) FILTER (e.kind = 'subscription') AS subscriptions,
     list(e.endpoint ORDER BY e.endpoint.id) FILTER (e.kind = 'publisher') AS publishers,
-    main.node_name(n.full_name) AS name, n.process_id, coalesce(p.name, '?') AS process, p.pid,
+    main.node_name(n.full_name) AS name,
+    n.process_id,
+    coalesce(p.name, '?') AS process,
+    p.pid,
     h.hostname AS host
 FROM main.node AS n
 JOIN main.process AS p ON n.process_id = p.process_id

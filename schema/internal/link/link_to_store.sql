@@ -10,8 +10,15 @@
 -- column: depth BIGINT          Of a queue: most messages that wait in it
 WITH link AS (
     SELECT
-        kind, process_id, inputs, outputs, min(place) AS place, last(depth ORDER BY place) AS depth
-    FROM (SELECT *, row_number() OVER () AS place FROM matched)
+        kind, process_id, inputs, outputs,
+        min(place) AS place,
+        last(depth ORDER BY place) AS depth
+    FROM (
+        SELECT
+            *,
+            row_number() OVER () AS place
+        FROM matched
+    )
     GROUP BY kind, process_id, inputs, outputs
 ),
 added AS (

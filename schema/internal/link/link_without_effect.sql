@@ -10,7 +10,8 @@ WITH declared AS (
 ),
 input AS (
     SELECT
-        i.annotation_id, string_agg(DISTINCT s.topic_name, ' and ' ORDER BY s.topic_name) AS topics,
+        i.annotation_id,
+        string_agg(DISTINCT s.topic_name, ' and ' ORDER BY s.topic_name) AS topics,
         min(r.start_event_id) AS first_event_id
     FROM store.annotation_input AS i
     JOIN store.subscription AS s ON i.subscription_id = s.subscription_id
@@ -19,7 +20,8 @@ input AS (
 ),
 output AS (
     SELECT
-        o.annotation_id, string_agg(DISTINCT p.topic_name, ' and ' ORDER BY p.topic_name) AS topics,
+        o.annotation_id,
+        string_agg(DISTINCT p.topic_name, ' and ' ORDER BY p.topic_name) AS topics,
         max(b.start_event_id) AS last_event_id,
         count(b.publication_id) AS number,
         count(i.subscription_id) AS own_count
@@ -32,7 +34,9 @@ output AS (
     GROUP BY o.annotation_id
 )
 SELECT
-    d.kind, i.topics AS inputs, o.topics AS outputs,
+    d.kind,
+    i.topics AS inputs,
+    o.topics AS outputs,
     CASE
         WHEN i.first_event_id IS NULL THEN printf('no message on %s was taken', i.topics)
         WHEN o.number = 0 THEN printf('nothing was published on %s', o.topics)

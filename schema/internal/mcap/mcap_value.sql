@@ -48,29 +48,40 @@ callback AS MATERIALIZED (
 ),
 value AS (
     SELECT
-        p.subject || f.doubt || '/latency_ms' AS subject, f.root_ns AS at_ns,
+        p.subject || f.doubt || '/latency_ms' AS subject,
+        f.root_ns AS at_ns,
         f.latency_ns AS value_ns
     FROM flow AS f
     JOIN path AS p ON f.path_id = p.path_id
     WHERE f.is_first
     UNION ALL
-    SELECT p.subject || f.doubt || '/age_ms', f.sink_ns, f.sink_ns - f.root_ns
+    SELECT
+        p.subject || f.doubt || '/age_ms',
+        f.sink_ns,
+        f.sink_ns - f.root_ns
     FROM flow AS f
     JOIN path AS p ON f.path_id = p.path_id
     WHERE f.is_newest
     UNION ALL
-    SELECT s.subject || '/latency_ms', t.taken_ns, l.latency_ns
+    SELECT
+        s.subject || '/latency_ms',
+        t.taken_ns, l.latency_ns
     FROM main.link_transport AS l
     JOIN main.take AS t ON l.take_id = t.take_id
     JOIN subscription AS s ON t.subscription_id = s.subscription_id
     WHERE l.latency_ns IS NOT NULL
     UNION ALL
-    SELECT c.subject || '/duration_ms', i.start_ns, i.end_ns - i.start_ns
+    SELECT
+        c.subject || '/duration_ms',
+        i.start_ns,
+        i.end_ns - i.start_ns
     FROM main.callback_instance AS i
     JOIN callback AS c ON i.callback_id = c.callback_id
     WHERE i.end_ns IS NOT NULL
     UNION ALL
-    SELECT c.subject || unnest(['/wait_min_ms', '/wait_max_ms']), w.start_ns,
+    SELECT
+        c.subject || unnest(['/wait_min_ms', '/wait_max_ms']),
+        w.start_ns,
         unnest([w.busy_min_ns, w.busy_max_ns])
     FROM main.executor_wait AS w
     JOIN callback AS c ON w.callback_id = c.callback_id

@@ -20,19 +20,27 @@ part AS MATERIALIZED (
     )
 ),
 passed AS MATERIALIZED (
-    SELECT root_kind AS kind, root_id AS id FROM part
+    SELECT
+        root_kind AS kind,
+        root_id AS id
+    FROM part
     UNION
-    SELECT 'take', take_id FROM part
+    SELECT 'take', take_id
+    FROM part
     UNION
     SELECT 'callback_instance', callback_instance_id
     FROM part
     WHERE callback_instance_id IS NOT NULL
     UNION
-    SELECT 'publication', publication_id FROM part WHERE publication_id IS NOT NULL
+    SELECT 'publication', publication_id
+    FROM part
+    WHERE publication_id IS NOT NULL
 ),
 -- Between two of these.
 between_them AS (
-    SELECT i.to_kind AS kind, i.to_id AS id
+    SELECT
+        i.to_kind AS kind,
+        i.to_id AS id
     FROM derive.flow_link AS i
     JOIN passed AS f ON i.from_kind = f.kind AND i.from_id = f.id
     JOIN derive.flow_link AS o ON i.to_kind = o.from_kind AND i.to_id = o.from_id

@@ -14,7 +14,9 @@
 -- param: identity VARCHAR = ''  What tells the run from others; ids are computed from it
 WITH RECURSIVE place AS (
     SELECT
-        i.run_id, l.is_internal, 'callback_instance' AS kind, i.callback_instance_id AS id,
+        i.run_id, l.is_internal,
+        'callback_instance' AS kind,
+        i.callback_instance_id AS id,
         i.start_ns AS at_ns
     FROM main.callback_instance AS i
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
@@ -28,11 +30,16 @@ WITH RECURSIVE place AS (
     LEFT JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
     UNION ALL
     SELECT
-        q.run_id, coalesce(c.is_internal, s.is_internal), q.kind, q.id,
+        q.run_id,
+        coalesce(c.is_internal, s.is_internal),
+        q.kind, q.id,
         coalesce(q.sent_ns, q.taken_ns)
     FROM (
         SELECT
-            run_id, 'request' AS kind, request_id AS id, sent_ns, taken_ns, client_id, service_id
+            run_id,
+            'request' AS kind,
+            request_id AS id,
+            sent_ns, taken_ns, client_id, service_id
         FROM main.request
         UNION ALL
         SELECT run_id, 'response', response_id, sent_ns, taken_ns, client_id, service_id
@@ -42,7 +49,9 @@ WITH RECURSIVE place AS (
     LEFT JOIN main.service AS s ON q.service_id = s.service_id
 ),
 otlp_vertex AS MATERIALIZED (
-    SELECT derive.vertex_key(kind, id)::BIGINT AS key, kind, id, 0 AS depth
+    SELECT
+        derive.vertex_key(kind, id)::BIGINT AS key,
+        kind, id, 0 AS depth
     FROM place
     WHERE run_id = $run_id AND is_internal IS NOT true
         AND CASE WHEN $keys IS NULL THEN at_ns >= $start_ns AND at_ns < $end_ns
@@ -50,12 +59,15 @@ otlp_vertex AS MATERIALIZED (
 ),
 described AS MATERIALIZED (
     SELECT
-        key, kind, id, start_ns, greatest(coalesce(end_ns, start_ns), start_ns) AS end_ns,
+        key, kind, id, start_ns,
+        greatest(coalesce(end_ns, start_ns), start_ns) AS end_ns,
         thread_id, process_id, node, label, topic_name, symbol
     FROM main.flow_vertex('otlp_vertex')
 ),
 link AS MATERIALIZED (
-    SELECT l.from_key, l.to_key, l.link_kind, f.end_ns AS caused_ns
+    SELECT
+        l.from_key, l.to_key, l.link_kind,
+        f.end_ns AS caused_ns
     FROM (
         SELECT
             derive.vertex_key(from_kind, from_id)::BIGINT AS from_key,
@@ -79,7 +91,9 @@ caused AS (
 ),
 cause AS MATERIALIZED (
     SELECT
-        to_key AS key, from_key AS cause_key, min(link_kind) AS link_kind,
+        to_key AS key,
+        from_key AS cause_key,
+        min(link_kind) AS link_kind,
         row_number() OVER (
             PARTITION BY to_key
             ORDER BY bool_and(derive.is_indirect(link_kind)), max(caused_ns) DESC, from_key
@@ -89,11 +103,16 @@ cause AS MATERIALIZED (
 ),
 -- Each step doubles how far up a vertex has looked: 64 of them reach any root.
 ancestor (key, root_key, step) USING KEY (key) AS (
-    SELECT d.key, coalesce(c.cause_key, d.key), 0
+    SELECT
+        d.key,
+        coalesce(c.cause_key, d.key),
+        0
     FROM described AS d
     LEFT JOIN cause AS c ON d.key = c.key AND c.place = 1
     UNION
-    SELECT a.key, b.root_key, a.step + 1
+    SELECT
+        a.key, b.root_key,
+        a.step + 1
     FROM ancestor AS a
     JOIN recurring.ancestor AS b ON a.root_key = b.key
     WHERE a.root_key <> b.root_key AND a.step < 64
@@ -138,7 +157,8 @@ fate AS (
 span AS (
     SELECT
         d.key, r.root_key, r.trace_id, r.span_id, d.kind, d.id, d.start_ns, d.end_ns, c.cause_key,
-        c.link_kind, d.thread_id, d.process_id, d.node, d.topic_name, d.symbol, k.kind AS trigger,
+        c.link_kind, d.thread_id, d.process_id, d.node, d.topic_name, d.symbol,
+        k.kind AS trigger,
         d.label,
         CASE WHEN k.kind = 'service' THEN v.service_name
             WHEN d.kind IN ('request', 'response') THEN d.label END AS service

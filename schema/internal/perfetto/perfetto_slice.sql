@@ -4,7 +4,9 @@
 -- grain: one row per slice
 WITH call AS MATERIALIZED (
     SELECT
-        q.run_id, 'request' AS kind, q.request_id AS id,
+        q.run_id,
+        'request' AS kind,
+        q.request_id AS id,
         q.sender_thread_id, q.sent_ns, q.receiver_thread_id, q.taken_ns,
         coalesce(
             'service ' || w.service_name || ' (' || coalesce(w.server, '?') || ')',
@@ -32,44 +34,63 @@ WITH call AS MATERIALIZED (
 slice AS (
     SELECT
         i.run_id, i.thread_id, i.start_ns, i.end_ns,
-        'callback' AS category, 'callback_instance' AS kind, i.callback_instance_id AS id,
+        'callback' AS category,
+        'callback_instance' AS kind,
+        i.callback_instance_id AS id,
         l.node || ' ' || l.label AS name,
         c.symbol,
-        true AS is_first, true AS is_last
+        true AS is_first,
+        true AS is_last
     FROM main.callback_instance AS i
     JOIN main.callback AS c ON i.callback_id = c.callback_id
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
     UNION ALL BY NAME
     SELECT
         b.run_id, b.thread_id, b.start_ns, b.end_ns,
-        'publication' AS category, 'publication' AS kind, b.publication_id AS id,
+        'publication' AS category,
+        'publication' AS kind,
+        b.publication_id AS id,
         'publish ' || coalesce(p.topic_name, '?') AS name,
-        true AS is_first, true AS is_last
+        true AS is_first,
+        true AS is_last
     FROM main.publication AS b
     LEFT JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
     UNION ALL BY NAME
     SELECT
-        t.run_id, t.thread_id, t.taken_ns AS start_ns,
-        'take' AS category, 'take' AS kind, t.take_id AS id,
+        t.run_id, t.thread_id,
+        t.taken_ns AS start_ns,
+        'take' AS category,
+        'take' AS kind,
+        t.take_id AS id,
         'take ' || coalesce(s.topic_name, '?') AS name,
-        true AS is_first, true AS is_last
+        true AS is_first,
+        true AS is_last
     FROM main.take AS t
     LEFT JOIN main.subscription AS s ON t.subscription_id = s.subscription_id
     WHERE t.method <> 'callback_only'
     UNION ALL BY NAME
     SELECT
-        run_id, sender_thread_id AS thread_id, sent_ns AS start_ns, returned_ns AS end_ns,
-        'service' AS category, kind, id,
+        run_id,
+        sender_thread_id AS thread_id,
+        sent_ns AS start_ns,
+        returned_ns AS end_ns,
+        'service' AS category,
+        kind, id,
         sent_name AS name,
         queue_ns, served_ns,
-        true AS is_first, taken_ns IS NULL AS is_last
+        true AS is_first,
+        taken_ns IS NULL AS is_last
     FROM call
     UNION ALL BY NAME
     SELECT
-        run_id, receiver_thread_id AS thread_id, taken_ns AS start_ns,
-        'service' AS category, kind, id,
+        run_id,
+        receiver_thread_id AS thread_id,
+        taken_ns AS start_ns,
+        'service' AS category,
+        kind, id,
         taken_name AS name,
-        sent_ns IS NULL AS is_first, true AS is_last
+        sent_ns IS NULL AS is_first,
+        true AS is_last
     FROM call
 ),
 drawn AS MATERIALIZED (
@@ -79,7 +100,9 @@ drawn AS MATERIALIZED (
         AND thread_id IS NOT NULL
 ),
 link AS (
-    SELECT from_kind, from_id, to_kind, to_id, link_kind, false AS is_within
+    SELECT
+        from_kind, from_id, to_kind, to_id, link_kind,
+        false AS is_within
     FROM derive.flow_link
     WHERE run_id = $run_id
     UNION ALL
@@ -87,8 +110,12 @@ link AS (
 ),
 arrow AS MATERIALIZED (
     SELECT
-        f.kind AS from_kind, f.id AS from_id, f.is_first AS is_from_first,
-        t.kind AS to_kind, t.id AS to_id, t.is_first AS is_to_first,
+        f.kind AS from_kind,
+        f.id AS from_id,
+        f.is_first AS is_from_first,
+        t.kind AS to_kind,
+        t.id AS to_id,
+        t.is_first AS is_to_first,
         hash(l.from_kind, l.from_id, l.to_kind, l.to_id, l.link_kind) AS arrow
     FROM link AS l
     JOIN drawn AS f
@@ -97,12 +124,20 @@ arrow AS MATERIALIZED (
         ON l.to_kind = t.kind AND l.to_id = t.id AND l.is_within <> t.is_first
 ),
 outgoing AS (
-    SELECT from_kind AS kind, from_id AS id, is_from_first AS is_first, list(arrow ORDER BY arrow) AS arrows
+    SELECT
+        from_kind AS kind,
+        from_id AS id,
+        is_from_first AS is_first,
+        list(arrow ORDER BY arrow) AS arrows
     FROM arrow
     GROUP BY ALL
 ),
 incoming AS (
-    SELECT to_kind AS kind, to_id AS id, is_to_first AS is_first, list(arrow ORDER BY arrow) AS arrows
+    SELECT
+        to_kind AS kind,
+        to_id AS id,
+        is_to_first AS is_first,
+        list(arrow ORDER BY arrow) AS arrows
     FROM arrow
     GROUP BY ALL
 )
@@ -120,8 +155,11 @@ UNION ALL BY NAME
 SELECT
     thread_id, start_ns,
     coalesce(end_ns, start_ns) AS end_ns,
-    'executor' AS track, 'executor' AS category, activity AS name,
-    'executor' AS kind, executor_id AS id
+    'executor' AS track,
+    'executor' AS category,
+    activity AS name,
+    'executor' AS kind,
+    executor_id AS id
 FROM main.executor_activity
 WHERE run_id = $run_id AND start_ns >= $start_ns AND start_ns < $end_ns
     AND thread_id IN (SELECT thread_id FROM main.executor_state WHERE run_id = $run_id)

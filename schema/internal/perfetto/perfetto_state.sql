@@ -20,8 +20,10 @@ WITH state AS MATERIALIZED (
     WHERE s.run_id = $run_id AND s.start_ns >= $start_ns AND s.start_ns < $end_ns
 )
 SELECT
-    NULL AS host_id, thread_id,
-    'kernel' AS track, 'schedule' AS category,
+    NULL AS host_id,
+    thread_id,
+    'kernel' AS track,
+    'schedule' AS category,
     CASE WHEN state = 'preempted' THEN concat_ws(' by ', state, other) ELSE state END AS name,
     start_ns, end_ns, cpu, priority,
     CASE WHEN waker_kind = 'thread' THEN other ELSE waker_kind END AS woken_by
@@ -29,9 +31,8 @@ FROM state
 UNION ALL
 SELECT
     host_id, NULL,
-    printf('%s: CPU %d', hostname, cpu), 'schedule',
-    thread,
-    start_ns,
+    printf('%s: CPU %d', hostname, cpu),
+    'schedule', thread, start_ns,
     least(end_ns, lead(start_ns) OVER (PARTITION BY host_id, cpu ORDER BY start_ns)),
     cpu, priority, NULL
 FROM state

@@ -3,7 +3,8 @@
 -- grain: one row per value
 WITH rate AS (
     SELECT
-        publisher_id, start_ns AS at_ns,
+        publisher_id,
+        start_ns AS at_ns,
         1e9 / nullif(start_ns - lag(start_ns) OVER (
             PARTITION BY publisher_id ORDER BY start_ns, publication_id
         ), 0) AS value
@@ -12,7 +13,9 @@ WITH rate AS (
 ),
 step AS (
     SELECT
-        t.subscription_id, t.take_id, unnest([b.end_ns, t.taken_ns]) AS at_ns, unnest([1, -1]) AS step
+        t.subscription_id, t.take_id,
+        unnest([b.end_ns, t.taken_ns]) AS at_ns,
+        unnest([1, -1]) AS step
     FROM main.link_transport AS l
     JOIN main.publication AS b ON l.publication_id = b.publication_id
     JOIN main.take AS t ON l.take_id = t.take_id
@@ -30,7 +33,9 @@ queue AS (
     )
 )
 SELECT
-    'rate' AS kind, p.publisher_id AS id, p.process_id,
+    'rate' AS kind,
+    p.publisher_id AS id,
+    p.process_id,
     'rate of ' || coalesce(p.topic_name, '?') AS name,
     'Hz' AS unit,
     r.at_ns, r.value, 0 AS place

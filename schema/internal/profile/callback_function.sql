@@ -10,7 +10,10 @@
 -- column: self_share DOUBLE  Its share of the CPU time
 -- column: all_samples BIGINT  Samples of the callback
 WITH sampled AS (
-    SELECT l.node, l.label AS callback, s.stack_id, s.cpu_ns
+    SELECT
+        l.node,
+        l.label AS callback,
+        s.stack_id, s.cpu_ns
     FROM main.stack_sample AS s
     JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
     JOIN main.callback_label AS l ON i.callback_id = l.callback_id
@@ -18,7 +21,9 @@ WITH sampled AS (
         AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
 ),
 longest AS (
-    SELECT node, callback, count(*) AS all_samples
+    SELECT
+        node, callback,
+        count(*) AS all_samples
     FROM sampled
     GROUP BY node, callback
     ORDER BY all_samples DESC, node, callback

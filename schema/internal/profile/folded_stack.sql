@@ -4,8 +4,10 @@
 -- param: instances BIGINT[] = NULL  Only samples of these callback instances
 WITH sample AS (
     SELECT
-        s.stack_id, i.callback_id, CASE WHEN i.callback_id IS NULL THEN s.process_id END
-            AS process_id, count(*) AS samples
+        s.stack_id, i.callback_id,
+        CASE WHEN i.callback_id IS NULL THEN s.process_id END
+            AS process_id,
+        count(*) AS samples
     FROM main.stack_sample AS s
     LEFT JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id
     WHERE s.run_id = $run_id
@@ -14,7 +16,9 @@ WITH sample AS (
     GROUP BY ALL
 ),
 stack AS (
-    SELECT c.stack_id, list(f.function ORDER BY c.position) AS functions
+    SELECT
+        c.stack_id,
+        list(f.function ORDER BY c.position) AS functions
     FROM main.stack_call AS c
     JOIN main.stack_frame AS f ON c.stack_frame_id = f.stack_frame_id
     WHERE c.run_id = $run_id

@@ -23,5 +23,10 @@
 SELECT
     verdict, target, subject, metric, condition, measured, value, unit, samples, reason, worst_ns,
     worst_at_ns, see, line, path
-FROM (SELECT *, row_number() OVER () AS place FROM judged)
+FROM (
+    SELECT
+        *,
+        row_number() OVER () AS place
+    FROM judged
+)
 ORDER BY list_position(['failed', 'not measured', 'no data', 'passed'], verdict), place

@@ -7,9 +7,17 @@
 -- param: least_values BIGINT  With fewer values, a percentile is only their largest
 WITH path AS (
     SELECT
-        steps[2] AS first, steps[-2] AS last, min(place) AS place, max(p99_ns) AS slow_ns,
+        steps[2] AS first,
+        steps[-2] AS last,
+        min(place) AS place,
+        max(p99_ns) AS slow_ns,
         min(reached / (roots - not_connected - cut_by_recording)) AS share
-    FROM (SELECT *, string_split(path, ' → ') AS steps FROM e2e_latency)
+    FROM (
+        SELECT
+            *,
+            string_split(path, ' → ') AS steps
+        FROM e2e_latency
+    )
     -- A service that is called has brackets.
     WHERE steps[2] LIKE '/%' AND steps[-2] LIKE '/%'
     GROUP BY ALL
@@ -17,7 +25,10 @@ WITH path AS (
 ),
 timer AS (
     SELECT
-        node, callback, min(place) AS place, min(rate_hz) AS least_hz, max(rate_hz) AS most_hz,
+        node, callback,
+        min(place) AS place,
+        min(rate_hz) AS least_hz,
+        max(rate_hz) AS most_hz,
         -- The time that an operating system may need to wake a thread.
         greatest(1e6, max(lateness_p99_ns)) AS late_ns,
         bool_and(lateness_p99_ns IS NOT NULL) AS is_late_known
@@ -27,7 +38,9 @@ timer AS (
 ),
 callback AS (
     SELECT
-        node, callback, min(place) AS place, max(running_p99_ns) AS slow_ns,
+        node, callback,
+        min(place) AS place,
+        max(running_p99_ns) AS slow_ns,
         1 + floor(
             100 * (1 + $margin) * coalesce(max(preempted_ns / nullif(total_ns, 0)), 0)
         )::BIGINT AS most_percent
@@ -38,7 +51,9 @@ callback AS (
 ),
 topic AS (
     SELECT
-        topic_name, publisher, min(place) AS place, any_value(rate_hz) AS rate_hz
+        topic_name, publisher,
+        min(place) AS place,
+        any_value(rate_hz) AS rate_hz
     FROM topics_rate
     WHERE topic_name IS NOT NULL AND publisher LIKE '/%'
     GROUP BY ALL
@@ -48,11 +63,16 @@ topic AS (
 ),
 called AS (
     SELECT
-        kind, name, min(place) AS place, max(slow_ns) AS slow_ns,
+        kind, name,
+        min(place) AS place,
+        max(slow_ns) AS slow_ns,
         if(kind = 'service', 'round_trip', 'goal') AS metric
     FROM (
         SELECT
-            'service' AS kind, service_name AS name, place, answered AS samples,
+            'service' AS kind,
+            service_name AS name,
+            place,
+            answered AS samples,
             round_trip_p99_ns AS slow_ns
         FROM service_latency
         UNION ALL
@@ -65,7 +85,9 @@ called AS (
 ),
 process AS (
     SELECT
-        nodes, process, min(place) AS place, max(p99_ns) AS slow_ns,
+        nodes, process,
+        min(place) AS place,
+        max(p99_ns) AS slow_ns,
         -- Without nodes it has its id, which is another one in the next run.
         if(nodes LIKE '/%', nodes, process) AS name
     FROM scheduling_wakeup
@@ -74,54 +96,85 @@ process AS (
 ),
 -- A time is allowed to be a little longer, and has its unit; else there is a text already.
 required (number, place, kind, names, field, metric, most_ns, condition) AS (
-    SELECT 10, place, 'path', [first, last], NULL, 'latency', slow_ns, NULL
+    SELECT
+        10, place, 'path',
+        [first, last],
+        NULL, 'latency', slow_ns, NULL
     FROM path
     UNION ALL
     SELECT
-        11, place, 'path', [first, last], NULL, 'completeness', NULL,
+        11, place, 'path',
+        [first, last],
+        NULL, 'completeness', NULL,
         printf('>= %d %%', floor(100 * share * (1 - $margin / 10))::BIGINT)
     FROM path
     UNION ALL
     SELECT
-        20, place, 'timer', [node, callback], 'callback', 'rate', NULL,
+        20, place, 'timer',
+        [node, callback],
+        'callback', 'rate', NULL,
         printf('%.4g Hz ± 5 %%', (most_hz + least_hz) / 2)
     FROM timer
     WHERE most_hz - least_hz <= 0.1 * least_hz
     UNION ALL
-    SELECT 21, place, 'timer', [node, callback], 'callback', 'lateness', late_ns, NULL
+    SELECT
+        21, place, 'timer',
+        [node, callback],
+        'callback', 'lateness', late_ns, NULL
     FROM timer
     WHERE is_late_known
     UNION ALL
-    SELECT 30, place, 'callback', [callback, node], 'node', 'cpu', slow_ns, NULL
+    SELECT
+        30, place, 'callback',
+        [callback, node],
+        'node', 'cpu', slow_ns, NULL
     FROM callback
     UNION ALL
     SELECT
-        31, place, 'callback', [callback, node], 'node', 'preempted', NULL,
+        31, place, 'callback',
+        [callback, node],
+        'node', 'preempted', NULL,
         printf('< %d %%', most_percent)
     FROM callback
     WHERE most_percent < 100
     UNION ALL
     SELECT
-        40, place, 'topic', [topic_name, publisher], 'node', 'rate', NULL,
+        40, place, 'topic',
+        [topic_name, publisher],
+        'node', 'rate', NULL,
         printf('%.4g Hz ± 5 %%', rate_hz)
     FROM topic
     UNION ALL
-    SELECT if(kind = 'service', 50, 60), place, kind, [name], NULL, metric, slow_ns, NULL
+    SELECT
+        if(kind = 'service', 50, 60),
+        place, kind,
+        [name],
+        NULL, metric, slow_ns, NULL
     FROM called
     UNION ALL
-    SELECT 70, place, 'process', [name], NULL, 'wakeup', slow_ns, NULL
+    SELECT
+        70, place, 'process',
+        [name],
+        NULL, 'wakeup', slow_ns, NULL
     FROM process
     WHERE name <> ''
 ),
 -- Rounded up to two digits.
 rounded AS (
     SELECT
-        *, list_last(list_filter([1, 1e3, 1e6, 1e9], lambda each: each <= allowed_ns)) AS unit_ns,
+        *,
+        list_last(list_filter([1, 1e3, 1e6, 1e9], lambda each: each <= allowed_ns)) AS unit_ns,
         pow(10, floor(log10(allowed_ns / unit_ns)) - 1) AS step
-    FROM (SELECT *, greatest(1, most_ns * (1 + $margin)) + 1 AS allowed_ns FROM required)
+    FROM (
+        SELECT
+            *,
+            greatest(1, most_ns * (1 + $margin)) + 1 AS allowed_ns
+        FROM required
+    )
 )
 SELECT
-    kind, names, field, list(metric ORDER BY number) AS metrics,
+    kind, names, field,
+    list(metric ORDER BY number) AS metrics,
     list(coalesce(condition, printf(
         'p99 < %.6g %s', ceil(allowed_ns / unit_ns / step) * step,
         CASE unit_ns WHEN 1 THEN 'ns' WHEN 1e3 THEN 'us' WHEN 1e6 THEN 'ms' ELSE 's' END

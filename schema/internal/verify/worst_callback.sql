@@ -3,7 +3,8 @@
 -- param: key
 SELECT
     end_ns - start_ns AS duration_ns,
-    start_ns AS at_ns, callback_instance_id AS id,
+    start_ns AS at_ns,
+    callback_instance_id AS id,
     'callback_instance' AS kind
 FROM main.callback_instance
 WHERE callback_id = $key AND end_ns IS NOT NULL AND start_ns >= $start_ns AND start_ns < $end_ns

@@ -2,7 +2,9 @@
 -- grain: one row, or none
 -- param: key BIGINT  Its callback
 SELECT
-    wait_ns AS duration_ns, start_ns AS at_ns, callback_instance_id AS id,
+    wait_ns AS duration_ns,
+    start_ns AS at_ns,
+    callback_instance_id AS id,
     'callback_instance' AS kind
 FROM main.executor_wait
 WHERE callback_id = $key AND since = 'timer' AND NOT is_loss_affected

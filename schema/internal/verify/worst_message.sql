@@ -2,7 +2,11 @@
 --     its way.
 -- grain: one row, or none
 -- param: key BIGINT  Subscription that took it
-SELECT l.latency_ns AS duration_ns, t.taken_ns AS at_ns, t.take_id AS id, 'take' AS kind
+SELECT
+    l.latency_ns AS duration_ns,
+    t.taken_ns AS at_ns,
+    t.take_id AS id,
+    'take' AS kind
 FROM main.link_transport AS l
 JOIN main.take AS t ON l.take_id = t.take_id
 WHERE t.subscription_id = $key AND t.taken_ns >= $start_ns AND t.taken_ns < $end_ns

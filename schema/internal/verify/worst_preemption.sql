@@ -3,7 +3,9 @@
 -- grain: one row, or none
 -- param: key
 SELECT
-    s.preempted_ns AS duration_ns, i.start_ns AS at_ns, i.callback_instance_id AS id,
+    s.preempted_ns AS duration_ns,
+    i.start_ns AS at_ns,
+    i.callback_instance_id AS id,
     'callback_instance' AS kind
 FROM main.callback_schedule AS s
 JOIN main.callback_instance AS i ON s.callback_instance_id = i.callback_instance_id

@@ -4,7 +4,8 @@
 -- param: key BIGINT[]  Service and client
 SELECT
     p.taken_ns - q.sent_ns AS duration_ns,
-    q.sent_ns AS at_ns, q.request_id AS id,
+    q.sent_ns AS at_ns,
+    q.request_id AS id,
     'request' AS kind
 FROM main.request AS q
 JOIN main.response AS p ON q.request_id = p.request_id

@@ -6,17 +6,24 @@
 --     but which node sends a message is known
 WITH slowest AS (
     SELECT *
-    FROM (SELECT *, row_number() OVER () AS place FROM piece)
+    FROM (
+        SELECT
+            *,
+            row_number() OVER () AS place
+        FROM piece
+    )
     ORDER BY duration_ns DESC, place
     LIMIT 2
 ),
 named AS (
     SELECT
-        duration_ns, place, activity, state, wakers > 0 AS is_woken,
+        duration_ns, place, activity, state,
+        wakers > 0 AS is_woken,
         coalesce(
             node, if(hop > 0, string_split($path, ' → ')[2 * hop - 1], NULL), 'an unknown node'
         ) AS node,
-        coalesce(what, 'a message') AS what, coalesce(who, 'another thread') AS who,
+        coalesce(what, 'a message') AS what,
+        coalesce(who, 'another thread') AS who,
         main.duration_text(duration_ns) AS time
     FROM slowest
     WHERE activity <> 'rest' AND share >= 0.2

@@ -4,7 +4,12 @@
 -- grain: one row per piece
 -- reads: slow_flow
 -- param: count BIGINT = 5  How many pieces
-WITH piece AS (SELECT *, row_number() OVER () AS place FROM slow_flow),
+WITH piece AS (
+    SELECT
+        *,
+        row_number() OVER () AS place
+    FROM slow_flow
+),
 longest AS (
     SELECT *
     FROM piece
@@ -16,10 +21,15 @@ FROM (
     FROM longest
     UNION ALL BY NAME
     SELECT
-        any_value(run_id) AS run_id, any_value(rank) AS rank, any_value(take_id) AS take_id,
-        any_value(latency_ns) AS latency_ns, sum(duration_ns)::BIGINT AS duration_ns,
-        sum(pieces)::BIGINT AS pieces, 'rest' AS activity,
-        round(coalesce(sum(share), 0), 4) AS share, max(place) + 1 AS place
+        any_value(run_id) AS run_id,
+        any_value(rank) AS rank,
+        any_value(take_id) AS take_id,
+        any_value(latency_ns) AS latency_ns,
+        sum(duration_ns)::BIGINT AS duration_ns,
+        sum(pieces)::BIGINT AS pieces,
+        'rest' AS activity,
+        round(coalesce(sum(share), 0), 4) AS share,
+        max(place) + 1 AS place
     FROM piece
     WHERE place NOT IN (SELECT place FROM longest)
     HAVING count(*) > 0

@@ -19,7 +19,12 @@ WITH longest AS (
         state, activity, callback_instance_id,
         nullif(node, '?') AS node,
         nullif(what, '?') AS topic_name
-    FROM (SELECT *, row_number() OVER () AS place FROM piece)
+    FROM (
+        SELECT
+            *,
+            row_number() OVER () AS place
+        FROM piece
+    )
     ORDER BY duration_ns DESC, place
     LIMIT 1
 )

@@ -3,7 +3,9 @@
 --     waited for.
 -- grain: one row per callback instance that is not nested in another
 WITH executor AS (
-    SELECT executor_id, NULL::BIGINT AS until_ns
+    SELECT
+        executor_id,
+        NULL::BIGINT AS until_ns
     FROM derive.executor_size
     WHERE list_contains($runs, run_id)
 )

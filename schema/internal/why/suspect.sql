@@ -18,15 +18,18 @@
 --     'callbacks'
 WITH span AS (
     SELECT
-        run_id, least(end_ns, $end_ns) - greatest(start_ns, $start_ns) AS length_ns,
+        run_id,
+        least(end_ns, $end_ns) - greatest(start_ns, $start_ns) AS length_ns,
         run_id IN (SELECT run_id FROM main.thread_state WHERE $has_kernel) AS has_kernel
     FROM main.run
     WHERE list_contains($runs, run_id)
 ),
 place AS MATERIALIZED (
     SELECT DISTINCT
-        b.node, b.what, b.path, b.part, b.p95_ns, e.p95_ns AS path_ns,
-        s.length_ns / nullif(e.roots, 0) AS period_ns, s.has_kernel,
+        b.node, b.what, b.path, b.part, b.p95_ns,
+        e.p95_ns AS path_ns,
+        s.length_ns / nullif(e.roots, 0) AS period_ns,
+        s.has_kernel,
         (b.node, b.what) IN (
             SELECT (node, label) FROM main.callback_label WHERE list_contains($runs, run_id)
             UNION ALL
@@ -39,7 +42,10 @@ place AS MATERIALIZED (
     WHERE (e.p95_ns > 0) IS NOT FALSE
 ),
 way AS MATERIALIZED (
-    SELECT DISTINCT path, path_ns, string_split(path, ' → ') AS steps FROM place
+    SELECT DISTINCT
+        path, path_ns,
+        string_split(path, ' → ') AS steps
+    FROM place
 ),
 callback AS MATERIALIZED (
     SELECT
@@ -67,7 +73,8 @@ computing AS (
     SELECT
         node, label, path, path_ns, limit_ns, is_unusual, usual_ns,
         greatest(least(p95_ns, computed_ns), 0) + own_ns AS cost_ns,
-        own_ns, true AS is_traced
+        own_ns,
+        true AS is_traced
     FROM callback
     UNION ALL
     -- Callbacks that are not traced: from a take to what is published.
@@ -80,9 +87,13 @@ other AS (
         c.node, c.label, c.path, c.path_ns, c.limit_ns, c.has_kernel,
         greatest(c.other_ns, c.beside_ns) AS other_ns,
         -- The groups of callbacks are not in a trace: a thread may be free, and must not run them.
-        c.beside_ns > 2 * c.other_ns AS is_supposed, c.other_run_ns,
-        o.node AS other_node, o.label AS other_label, o.callback_id,
-        s.server AS likely_server, s.service_name AS likely_service
+        c.beside_ns > 2 * c.other_ns AS is_supposed,
+        c.other_run_ns,
+        o.node AS other_node,
+        o.label AS other_label,
+        o.callback_id,
+        s.server AS likely_server,
+        s.service_name AS likely_service
     FROM callback AS c
     JOIN main.callback_label AS o ON c.other_id = o.callback_id
     -- On a path it is known what it waits for, as far as times show it.
@@ -93,7 +104,8 @@ other AS (
 -- How long those run that keep others waiting, and the service that they wait for themselves.
 holding AS (
     SELECT
-        i.callback_id, quantile_disc(i.end_ns - i.start_ns, 0.5) AS usual_ns,
+        i.callback_id,
+        quantile_disc(i.end_ns - i.start_ns, 0.5) AS usual_ns,
         quantile_disc(i.end_ns - i.start_ns, 0.95) AS run_ns,
         arg_max(w.service_name, w.call_ns) AS service_name,
         arg_max(w.server, w.call_ns) AS server,
@@ -101,7 +113,8 @@ holding AS (
     FROM main.callback_instance AS i
     LEFT JOIN (
         SELECT
-            callback_instance_id, sum(returned_ns - sent_ns) AS call_ns,
+            callback_instance_id,
+            sum(returned_ns - sent_ns) AS call_ns,
             arg_max(service_name, returned_ns - sent_ns) AS service_name,
             arg_max(
                 coalesce(server, 'a server that is not recorded'), returned_ns - sent_ns
@@ -139,7 +152,8 @@ flowing AS (
 ),
 failed AS (
     SELECT
-        f.topic_name, f.subscriber, f.dropped, f.lost, f.delivered + f.dropped + f.lost AS known,
+        f.topic_name, f.subscriber, f.dropped, f.lost,
+        f.delivered + f.dropped + f.lost AS known,
         f.queue_depth, w.in_hz, w.out_hz, p.path, p.path_ns
     FROM failing AS f
     JOIN flowing AS w ON f.subscription_id = w.subscription_id
@@ -149,7 +163,8 @@ failed AS (
 ),
 created AS (
     SELECT
-        n.full_name, n.created_ns, quantile_disc(n.created_ns, 0.5) OVER () AS usual_ns,
+        n.full_name, n.created_ns,
+        quantile_disc(n.created_ns, 0.5) OVER () AS usual_ns,
         s.length_ns
     FROM main.node AS n
     JOIN span AS s ON n.run_id = s.run_id
@@ -157,14 +172,17 @@ created AS (
 ),
 late AS (
     SELECT
-        c.full_name AS node, p.path, p.path_ns,
+        c.full_name AS node,
+        p.path, p.path_ns,
         (c.created_ns - c.usual_ns)::BIGINT AS cost_ns,
         d.missed, d.topic_name, d.published
     FROM created AS c
     JOIN way AS p ON list_contains(p.steps, c.full_name)
     LEFT JOIN (
         SELECT
-            subscriber, sum(published) AS published, string_agg(topic_name, ', ') AS topic_name,
+            subscriber,
+            sum(published) AS published,
+            string_agg(topic_name, ', ') AS topic_name,
             sum(reasons['before_subscription'])::BIGINT AS missed
         FROM delivery
         WHERE reasons['before_subscription'] > 0
@@ -178,7 +196,8 @@ late AS (
 -- What timers may use, by all that their nodes keep and that comes more often.
 kept AS (
     SELECT
-        n.full_name AS node, d.topic_name, t.period_ns,
+        n.full_name AS node,
+        d.topic_name, t.period_ns,
         string_agg(
             printf('on %s every %s', d.topic_name, main.duration_text(c.period_ns::BIGINT)), ', '
         ) OVER (
@@ -194,7 +213,9 @@ kept AS (
 ),
 sampled AS (
     SELECT
-        p.node, p.what, p.path, p.path_ns, p.p95_ns AS cost_ns, NULL AS inputs,
+        p.node, p.what, p.path, p.path_ns,
+        p.p95_ns AS cost_ns,
+        NULL AS inputs,
         -- A callback of a message has to wait for the other inputs that it uses together.
         starts_with(p.what, 'Timer(') AND c.period_ns >= 2 * p.period_ns
         AND p.p95_ns >= 20_000_000 AS matters
@@ -203,7 +224,10 @@ sampled AS (
     WHERE p.part = 'cache'
     UNION ALL
     SELECT
-        k.node, printf('Timer(%.10g ms)', k.period_ns / 1e6), p.path, p.path_ns, k.period_ns // 2,
+        k.node,
+        printf('Timer(%.10g ms)', k.period_ns / 1e6),
+        p.path, p.path_ns,
+        k.period_ns // 2,
         printf('%s and wait for up to %s', k.inputs, main.duration_text(k.period_ns)),
         k.period_ns >= 20_000_000
     FROM kept AS k
@@ -211,7 +235,9 @@ sampled AS (
 ),
 -- Executors of several threads that look for work again and again.
 awake AS (
-    SELECT n.full_name AS node, min(f.detail) AS detail
+    SELECT
+        n.full_name AS node,
+        min(f.detail) AS detail
     FROM store.finding AS f
     JOIN main.node AS n ON f.process_id = n.process_id
     WHERE f.name = 'busy_waiting' AND list_contains($runs, f.run_id)
@@ -219,7 +245,10 @@ awake AS (
 ),
 moving AS (
     SELECT
-        p.what AS topic, p.path, p.path_ns, p.has_kernel, true AS is_traced, c.node,
+        p.what AS topic,
+        p.path, p.path_ns, p.has_kernel,
+        true AS is_traced,
+        c.node,
         -- A thread that waits for a CPU, and not for work, is not known to have some: messages that
         -- wait for others then seem to be on the way, unless their arrival is known.
         greatest(
@@ -243,7 +272,10 @@ moving AS (
     WHERE part = 'undecided' AND NOT is_traced
 )
 SELECT
-    'callback' AS kind, node AS who, label AS what, path, cost_ns,
+    'callback' AS kind,
+    node AS who,
+    label AS what,
+    path, cost_ns,
     cost_ns >= limit_ns AND cost_ns >= 0.1 * path_ns AS matters,
     printf(
         CASE
@@ -295,7 +327,9 @@ FROM other AS o
 JOIN holding AS h ON o.callback_id = h.callback_id
 UNION ALL
 SELECT
-    'cpu', coalesce(cpu_by, node), node, path, cpu_ns,
+    'cpu',
+    coalesce(cpu_by, node),
+    node, path, cpu_ns,
     cpu_ns >= limit_ns AND cpu_ns >= 0.1 * path_ns,
     CASE WHEN cpu_by IS NULL
         THEN printf(
@@ -312,7 +346,9 @@ FROM callback
 WHERE cpu_ns > 0
 UNION ALL
 SELECT
-    'service', coalesce(server, 'a server that is not recorded'), service_name, path,
+    'service',
+    coalesce(server, 'a server that is not recorded'),
+    service_name, path,
     call_ns + queued_ns,
     call_ns + queued_ns >= limit_ns AND call_ns + queued_ns >= 0.1 * path_ns,
     printf(
@@ -331,7 +367,8 @@ FROM callback
 WHERE call_ns > 0
 UNION ALL
 SELECT
-    'queue', subscriber, topic_name, path, (dropped / known * 1e9 / out_hz)::BIGINT,
+    'queue', subscriber, topic_name, path,
+    (dropped / known * 1e9 / out_hz)::BIGINT,
     dropped >= 3 AND dropped >= 0.02 * known,
     printf(
         'its queue of %s overwrote %d of %d messages on %s',
@@ -344,7 +381,8 @@ FROM failed
 WHERE dropped > 0
 UNION ALL
 SELECT
-    'lost', subscriber, topic_name, path, (lost / known * 1e9 / in_hz)::BIGINT,
+    'lost', subscriber, topic_name, path,
+    (lost / known * 1e9 / in_hz)::BIGINT,
     lost >= 3 AND lost >= 0.02 * known,
     printf('%d of %d messages on %s were lost on the way', lost, known, coalesce(topic_name, '?')),
     NULL
@@ -372,7 +410,8 @@ FROM sampled
 UNION ALL
 SELECT
     CASE WHEN a.detail IS NULL THEN 'way' ELSE 'executor' END,
-    coalesce(m.node, 'between nodes'), m.topic, m.path, m.cost_ns,
+    coalesce(m.node, 'between nodes'),
+    m.topic, m.path, m.cost_ns,
     m.cost_ns >= 20_000_000 AND m.cost_ns >= 0.1 * m.path_ns,
     printf(
         CASE

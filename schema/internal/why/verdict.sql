@@ -38,7 +38,9 @@ touching AS (
 ),
 found AS (
     SELECT
-        min(place) AS place, name, arg_min(subject, place) AS subject,
+        min(place) AS place,
+        name,
+        arg_min(subject, place) AS subject,
         printf(
             '%s — %s: %s', any_value(title), arg_min(subject, place), arg_min(detail, place)
         )
@@ -52,11 +54,17 @@ found AS (
 ),
 chosen AS (
     SELECT
-        kind, who, what, arg_min(path, (-cost_ns, path)) AS path, max(cost_ns) AS cost_ns,
+        kind, who, what,
+        arg_min(path, (-cost_ns, path)) AS path,
+        max(cost_ns) AS cost_ns,
         unnest(arg_min({'clause': clause, 'lacks': lacks}, (-cost_ns, path, clause)))
     FROM (
         SELECT
-            kind, coalesce(who, '?') AS who, what, path, coalesce(cost_ns, 0) AS cost_ns, lacks,
+            kind,
+            coalesce(who, '?') AS who,
+            what, path,
+            coalesce(cost_ns, 0) AS cost_ns,
+            lacks,
             clause || CASE lacks
                 WHEN 'kernel' THEN ' (not known without a kernel trace)'
                 WHEN 'callbacks' THEN ' (not known without its callbacks)'
@@ -94,17 +102,24 @@ slowest AS (
 ),
 said AS (
     SELECT
-        place, subject AS who, [name] AS kinds, NULL::BIGINT AS cost_ns,
-        NULL::VARCHAR AS path, sentence, []::VARCHAR[] AS lacks
+        place,
+        subject AS who,
+        [name] AS kinds,
+        NULL::BIGINT AS cost_ns,
+        NULL::VARCHAR AS path,
+        sentence,
+        []::VARCHAR[] AS lacks
     FROM found
     UNION ALL
     SELECT
-        1e6 + row_number() OVER (ORDER BY cost_ns DESC, who), who, kinds, cost_ns, path,
-        sentence, lacks
+        1e6 + row_number() OVER (ORDER BY cost_ns DESC, who),
+        who, kinds, cost_ns, path, sentence, lacks
     FROM told
     UNION ALL
     SELECT
-        1e6, NULL, [], NULL, s.path,
+        1e6, NULL,
+        [],
+        NULL, s.path,
         printf(
             'nothing stands out: 95 %% of the data on the slowest path arrive within %s; what takes'
             || ' longest on it is %s of %s, with up to %s',

@@ -6,7 +6,10 @@
 -- column: last_ns BIGINT [epoch ns]  It had not warmed up by then; NULL: it does not warm up
 WITH flow AS (
     SELECT
-        run_id AS side, path_id AS subject, root_ns AS at_ns, latency_ns AS value_ns,
+        run_id AS side,
+        path_id AS subject,
+        root_ns AS at_ns,
+        latency_ns AS value_ns,
         count(*) OVER (PARTITION BY run_id, path_id) AS number,
         row_number() OVER (
             PARTITION BY run_id, path_id ORDER BY root_ns, root_id, latency_ns

@@ -35,7 +35,8 @@ WITH chosen AS MATERIALIZED (
 within AS (
     SELECT
         i.callback_instance_id, c.node, c.label, v.service_id, v.service_name, v.process_id,
-        v.node_id, j.end_ns - j.start_ns AS served_ns
+        v.node_id,
+        j.end_ns - j.start_ns AS served_ns
     FROM chosen AS c
     JOIN main.callback_instance AS i ON c.callback_id = i.callback_id
     -- A process may have several clients of one service.
@@ -48,7 +49,9 @@ within AS (
         ON s.callback_id = j.callback_id AND i.start_ns < j.start_ns AND i.end_ns > j.end_ns
 ),
 ran_at_all AS (
-    SELECT s.service_id, count(*) AS instances
+    SELECT
+        s.service_id,
+        count(*) AS instances
     FROM main.callback AS s
     JOIN main.callback_instance AS j ON s.callback_id = j.callback_id
     WHERE s.service_id IN (SELECT service_id FROM within)
@@ -57,7 +60,8 @@ ran_at_all AS (
 call AS MATERIALIZED (
     SELECT
         w.callback_instance_id, c.node, c.label, w.service_name, w.server, w.served_ns,
-        w.returned_ns - w.sent_ns AS call_ns, true AS is_recorded
+        w.returned_ns - w.sent_ns AS call_ns,
+        true AS is_recorded
     FROM main.waited_call AS w
     JOIN main.callback_instance AS i ON w.callback_instance_id = i.callback_instance_id
     JOIN chosen AS c ON i.callback_id = c.callback_id
@@ -65,7 +69,8 @@ call AS MATERIALIZED (
     UNION ALL
     SELECT
         w.callback_instance_id, w.node, w.label, w.service_name,
-        main.node_label(n.full_name, r.name, r.pid), w.served_ns, w.served_ns, false
+        main.node_label(n.full_name, r.name, r.pid),
+        w.served_ns, w.served_ns, false
     FROM within AS w
     JOIN ran_at_all AS a ON w.service_id = a.service_id
     JOIN main.process AS r ON w.process_id = r.process_id
@@ -96,7 +101,8 @@ computed AS (
 ran AS MATERIALIZED (
     SELECT
         m.callback_instance_id, m.node, m.label, m.other_id,
-        least(m.overlap_ns, m.instances * p.computed_ns) AS overlap_ns, m.instances,
+        least(m.overlap_ns, m.instances * p.computed_ns) AS overlap_ns,
+        m.instances,
         o.callback_id IS NOT NULL AS is_own
     FROM meanwhile AS m
     LEFT JOIN computed AS p ON m.other_id = p.callback_id
@@ -126,7 +132,8 @@ taken AS (
 ),
 instance AS MATERIALIZED (
     SELECT
-        c.node, c.label, i.end_ns - i.start_ns AS run_ns,
+        c.node, c.label,
+        i.end_ns - i.start_ns AS run_ns,
         i.start_ns - lag(i.start_ns)
             OVER (PARTITION BY i.callback_id ORDER BY i.start_ns) AS period_ns,
         s.preempted_ns + s.runnable_ns AS lost_ns,
@@ -145,7 +152,9 @@ instance AS MATERIALIZED (
         ON i.callback_instance_id = s.callback_instance_id
     LEFT JOIN explained_wait AS w ON i.callback_instance_id = w.callback_instance_id
     LEFT JOIN (
-        SELECT callback_instance_id, sum(call_ns)::BIGINT AS call_ns
+        SELECT
+            callback_instance_id,
+            sum(call_ns)::BIGINT AS call_ns
         FROM call
         GROUP BY callback_instance_id
     ) AS q
@@ -185,10 +194,13 @@ SELECT
     m.beside_ns, m.other_run_ns, o.other_id
 FROM measured AS m
 LEFT JOIN (
-    SELECT node, label, arg_max(name, total_ns) AS cpu_by
+    SELECT
+        node, label,
+        arg_max(name, total_ns) AS cpu_by
     FROM (
         SELECT
-            node, label, sum(length_ns) AS total_ns,
+            node, label,
+            sum(length_ns) AS total_ns,
             printf('%s (%d', name, arg_max(tid, length_ns))
             || CASE WHEN count(*) > 1 THEN printf(' and %d more)', count(*) - 1) ELSE ')' END
                 AS name
@@ -200,7 +212,8 @@ LEFT JOIN (
     ON m.node = t.node AND m.label = t.label
 LEFT JOIN (
     SELECT
-        node, label, service_name, server, is_recorded, quantile_disc(served_ns, 0.5) AS served_ns
+        node, label, service_name, server, is_recorded,
+        quantile_disc(served_ns, 0.5) AS served_ns
     FROM call
     GROUP BY node, label, service_name, server, is_recorded
     QUALIFY row_number() OVER (
@@ -209,9 +222,13 @@ LEFT JOIN (
 ) AS q
     ON m.node = q.node AND m.label = q.label
 LEFT JOIN (
-    SELECT node, label, arg_max(other_id, total_ns) AS other_id
+    SELECT
+        node, label,
+        arg_max(other_id, total_ns) AS other_id
     FROM (
-        SELECT node, label, other_id, sum(overlap_ns) AS total_ns
+        SELECT
+            node, label, other_id,
+            sum(overlap_ns) AS total_ns
         FROM ran
         WHERE NOT is_own
         GROUP BY node, label, other_id

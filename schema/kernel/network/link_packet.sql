@@ -6,12 +6,17 @@
 -- grain: one row per packet and clock that received it
 -- when: staging.single_packet
 WITH counted AS (
-    SELECT clock_id, is_sent, key, count(*) AS number
+    SELECT
+        clock_id, is_sent, key,
+        count(*) AS number
     FROM staging.single_packet
     GROUP BY clock_id, is_sent, key
 ),
 shared AS (
-    SELECT s.clock_id AS from_clock_id, r.clock_id AS to_clock_id, s.key
+    SELECT
+        s.clock_id AS from_clock_id,
+        r.clock_id AS to_clock_id,
+        s.key
     FROM counted AS s
     JOIN counted AS r ON s.key = r.key
     WHERE s.is_sent AND NOT r.is_sent AND s.clock_id <> r.clock_id
@@ -21,7 +26,9 @@ shared AS (
     ) <= 1_000_000
 ),
 difference AS (
-    SELECT k.from_clock_id, k.to_clock_id, r.ts_ns - s.ts_ns AS way_ns
+    SELECT
+        k.from_clock_id, k.to_clock_id,
+        r.ts_ns - s.ts_ns AS way_ns
     FROM shared AS k
     JOIN staging.single_packet AS s ON k.key = s.key AND k.from_clock_id = s.clock_id
     JOIN staging.single_packet AS r ON k.key = r.key AND k.to_clock_id = r.clock_id
@@ -30,7 +37,8 @@ difference AS (
 -- Each difference votes for both of the stretches of two seconds that it lies in.
 stretch AS (
     SELECT
-        from_clock_id, to_clock_id, second, count(*) AS votes,
+        from_clock_id, to_clock_id, second,
+        count(*) AS votes,
         quantile_disc(way_ns, 0.5) AS shift_ns
     FROM (
         SELECT
@@ -70,9 +78,12 @@ due AS (
 ),
 matched AS (
     SELECT
-        s.event_id AS sent_event_id, r.event_id AS received_event_id,
-        s.trace_id AS sent_trace_id, r.trace_id AS received_trace_id,
-        s.ts_ns AS sent_ns, r.ts_ns AS received_ns
+        s.event_id AS sent_event_id,
+        r.event_id AS received_event_id,
+        s.trace_id AS sent_trace_id,
+        r.trace_id AS received_trace_id,
+        s.ts_ns AS sent_ns,
+        r.ts_ns AS received_ns
     FROM due AS s
     JOIN staging.single_packet AS r
         ON s.key = r.key AND s.to_clock_id = r.clock_id AND s.second = r.ts_ns // 1_000_000_000

@@ -10,9 +10,13 @@
 -- grain: one row per packet sent or received on a host
 -- when: raw.net_dev_queue, raw.net_if_receive_skb
 WITH recorded AS (
-    SELECT *, true AS is_sent FROM raw.net_dev_queue
+    SELECT
+        *,
+        true AS is_sent
+    FROM raw.net_dev_queue
     UNION ALL
-    SELECT *, false FROM raw.net_if_receive_skb
+    SELECT *, false
+    FROM raw.net_if_receive_skb
 )
 SELECT
     p.event_id, t.trace_id, h.clock_id, p.ts_ns, p.is_sent,

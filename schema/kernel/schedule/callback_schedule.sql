@@ -34,7 +34,9 @@ part AS (
 -- While a thread of a ROS process had the CPU.
 interrupt AS (
     SELECT
-        r.number AS state_number, i.kind::VARCHAR AS kind, i.start_ns + s.shift_ns AS start_ns,
+        r.number AS state_number,
+        i.kind::VARCHAR AS kind,
+        i.start_ns + s.shift_ns AS start_ns,
         i.end_ns + s.shift_ns AS end_ns
     FROM raw.interrupt AS i
     JOIN staging.schedule AS s ON i.trace_index = s.trace_index

@@ -2,7 +2,11 @@
 -- grain: one row per callback instance that ended and state that it overlaps
 -- when: staging.thread_state
 WITH extent AS (
-    SELECT thread_id, min(number) AS first_number FROM staging.thread_state GROUP BY thread_id
+    SELECT
+        thread_id,
+        min(number) AS first_number
+    FROM staging.thread_state
+    GROUP BY thread_id
 ),
 covered AS (
     SELECT
@@ -16,7 +20,8 @@ covered AS (
     WHERE i.end_ns > i.start_ns
 )
 SELECT
-    c.callback_instance_id, c.number AS state_number,
+    c.callback_instance_id,
+    c.number AS state_number,
     greatest(c.start_ns, s.start_ns) AS start_ns,
     least(c.end_ns, s.end_ns) AS end_ns,
     s.start_ns > c.start_ns AS is_begin

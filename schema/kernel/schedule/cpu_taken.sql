@@ -9,7 +9,10 @@ WITH wait AS (
 ),
 -- All switches are sorted, with few and narrow columns, once for both ends of the waits.
 extent AS (
-    SELECT w.number, min(r.switch_number) AS first_number, max(r.switch_number) AS last_number
+    SELECT
+        w.number,
+        min(r.switch_number) AS first_number,
+        max(r.switch_number) AS last_number
     FROM (
         SELECT
             number, trace_index, cpu,
@@ -21,12 +24,20 @@ extent AS (
     GROUP BY w.number
     HAVING count(*) = 2
 ),
-run AS (SELECT number, unnest(range(first_number, last_number + 1)) AS switch_number FROM extent)
+run AS (
+    SELECT
+        number,
+        unnest(range(first_number, last_number + 1)) AS switch_number
+    FROM extent
+)
 SELECT
-    w.thread_id, w.state_start_ns, w.start_ns AS wait_start_ns,
+    w.thread_id, w.state_start_ns,
+    w.start_ns AS wait_start_ns,
     greatest(w.start_ns, r.ts_ns + w.shift_ns) AS start_ns,
     least(w.end_ns, coalesce(e.ts_ns + w.shift_ns, w.end_ns)) AS end_ns,
-    w.state, w.cpu, w.clock_key, r.next_tid AS tid, r.next_comm AS name,
+    w.state, w.cpu, w.clock_key,
+    r.next_tid AS tid,
+    r.next_comm AS name,
     r.next_prio + CASE WHEN o.tracer LIKE 'perf%' THEN 0 ELSE 100 END AS priority,
     w.priority AS thread_priority
 FROM run AS n

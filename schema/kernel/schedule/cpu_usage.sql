@@ -15,7 +15,8 @@ WITH extent AS (
 ),
 run AS (
     SELECT
-        e.clock_key, e.cpu, w.prev_tid AS tid,
+        e.clock_key, e.cpu,
+        w.prev_tid AS tid,
         greatest(w.run_start_ns + e.shift_ns, e.from_ns) AS start_ns,
         w.ts_ns + e.shift_ns AS end_ns
     FROM raw.sched_switch AS w
@@ -30,7 +31,8 @@ part AS (
 ),
 usage AS (
     SELECT
-        clock_key, cpu, tid, second, min(start_ns) AS first_ns,
+        clock_key, cpu, tid, second,
+        min(start_ns) AS first_ns,
         sum(
             least(end_ns, (second + 1) * 1_000_000_000)
             - greatest(start_ns, second * 1_000_000_000)
@@ -39,7 +41,10 @@ usage AS (
     GROUP BY ALL
 ),
 named AS (
-    SELECT s.clock_key, w.next_tid AS tid, arg_max(w.next_comm, w.event_id) AS name
+    SELECT
+        s.clock_key,
+        w.next_tid AS tid,
+        arg_max(w.next_comm, w.event_id) AS name
     FROM raw.sched_switch AS w
     JOIN staging.schedule AS s ON w.trace_index = s.trace_index
     WHERE s.is_joined
@@ -47,18 +52,23 @@ named AS (
 ),
 speed AS (
     SELECT
-        clock_key, cpu, hz, at_ns AS start_ns,
+        clock_key, cpu, hz,
+        at_ns AS start_ns,
         lead(at_ns, 1, last_ns) OVER (PARTITION BY clock_key, cpu ORDER BY at_ns) AS end_ns
     FROM (
         SELECT
-            s.clock_key, f.of_cpu AS cpu, f.frequency_khz * 1000 AS hz,
+            s.clock_key,
+            f.of_cpu AS cpu,
+            f.frequency_khz * 1000 AS hz,
             f.ts_ns + s.shift_ns AS at_ns
         FROM raw.power_cpu_frequency AS f
         JOIN staging.schedule AS s ON f.trace_index = s.trace_index
         WHERE s.is_joined
     )
     JOIN (
-        SELECT s.clock_key, max(w.ts_ns + s.shift_ns) AS last_ns
+        SELECT
+            s.clock_key,
+            max(w.ts_ns + s.shift_ns) AS last_ns
         FROM raw.sched_switch AS w
         JOIN staging.schedule AS s ON w.trace_index = s.trace_index
         WHERE s.is_joined
@@ -86,7 +96,9 @@ frequency AS (
     GROUP BY ALL
 ),
 host AS (
-    SELECT s.clock_key, min(t.host_id) AS host_id
+    SELECT
+        s.clock_key,
+        min(t.host_id) AS host_id
     FROM staging.schedule AS s
     JOIN staging.trace AS t ON s.trace_index + 1 = t.trace_id
     WHERE s.is_joined

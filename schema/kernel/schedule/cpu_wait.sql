@@ -6,7 +6,10 @@
 
 -- Two kernel traces of a host have the same migrations: those count of the trace of the wait.
 WITH migration AS (
-    SELECT m.trace_index, t.thread_id, t.tid, m.ts_ns + s.shift_ns AS at_ns, m.dest_cpu AS cpu
+    SELECT
+        m.trace_index, t.thread_id, t.tid,
+        m.ts_ns + s.shift_ns AS at_ns,
+        m.dest_cpu AS cpu
     FROM raw.sched_migrate_task AS m
     JOIN staging.schedule AS s ON m.trace_index = s.trace_index
     JOIN staging.thread_tid AS t ON staging.has_tid(t, s.clock_key, m.tid, m.ts_ns + s.shift_ns)
@@ -15,7 +18,9 @@ WITH migration AS (
 wait AS (SELECT * FROM staging.schedule_interval WHERE state IN ('preempted', 'runnable')),
 begin AS (
     SELECT
-        w.thread_id, w.tid, w.start_ns AS state_start_ns, w.start_ns,
+        w.thread_id, w.tid,
+        w.start_ns AS state_start_ns,
+        w.start_ns,
         CASE
             WHEN m.at_ns = w.start_ns THEN m.cpu
             WHEN w.state = 'preempted' THEN w.cpu
@@ -32,7 +37,11 @@ begin AS (
         AND w.start_ns >= m.at_ns
 ),
 cut AS (
-    SELECT m.thread_id, m.tid, w.start_ns AS state_start_ns, m.at_ns AS start_ns, m.cpu
+    SELECT
+        m.thread_id, m.tid,
+        w.start_ns AS state_start_ns,
+        m.at_ns AS start_ns,
+        m.cpu
     FROM migration AS m
     ASOF JOIN wait AS w
         ON m.trace_index = w.trace_index

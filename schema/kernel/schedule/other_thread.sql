@@ -3,7 +3,10 @@
 -- grain: one row per host, tid and name
 -- when: staging.schedule_interval
 WITH seen AS (
-    SELECT clock_key, tid, name, start_ns AS at_ns FROM staging.cpu_taken
+    SELECT
+        clock_key, tid, name,
+        start_ns AS at_ns
+    FROM staging.cpu_taken
     UNION ALL
     SELECT w.clock_key, w.waker_tid, w.waker_name, w.at_ns
     FROM staging.thread_waking AS w
@@ -11,7 +14,9 @@ WITH seen AS (
         AND w.event_id IN (SELECT waking_event_id FROM staging.schedule_interval)
 ),
 host AS (
-    SELECT s.clock_key, min(t.host_id) AS host_id
+    SELECT
+        s.clock_key,
+        min(t.host_id) AS host_id
     FROM staging.schedule AS s
     JOIN staging.trace AS t ON s.trace_index + 1 = t.trace_id
     WHERE s.is_joined

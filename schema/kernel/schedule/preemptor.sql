@@ -5,7 +5,8 @@ SELECT
     c.thread_id, c.state_start_ns, c.wait_start_ns, c.start_ns, c.end_ns, c.state, c.cpu,
     t.thread_id AS preemptor_thread_id,
     CASE WHEN t.thread_id IS NULL THEN o.other_thread_id END AS preemptor_other_thread_id,
-    c.priority AS preemptor_priority, c.thread_priority
+    c.priority AS preemptor_priority,
+    c.thread_priority
 FROM staging.cpu_taken AS c
 LEFT JOIN staging.thread_tid AS t ON staging.has_tid(t, c.clock_key, c.tid, c.start_ns)
 LEFT JOIN staging.other_thread AS o

@@ -5,7 +5,10 @@
 -- grain: one row per interval in which a thread had one state
 -- when: staging.thread_switch
 WITH extent AS (
-    SELECT s.clock_key, min(w.ts_ns + s.shift_ns) AS start_ns, max(w.ts_ns + s.shift_ns) AS end_ns
+    SELECT
+        s.clock_key,
+        min(w.ts_ns + s.shift_ns) AS start_ns,
+        max(w.ts_ns + s.shift_ns) AS end_ns
     FROM raw.sched_switch AS w
     JOIN staging.schedule AS s ON w.trace_index = s.trace_index
     WHERE s.is_joined
@@ -77,7 +80,8 @@ placed AS (
 ),
 interval AS (
     SELECT
-        thread_id, tid, trace_index, at_ns AS start_ns,
+        thread_id, tid, trace_index,
+        at_ns AS start_ns,
         coalesce(slept_until_ns, end_ns) AS end_ns,
         state, cpu, next_cpu, priority, waking_event_id
     FROM placed
@@ -103,7 +107,8 @@ interval AS (
             WHEN s.is_on THEN 'runnable'
             ELSE 'running'
         END,
-        s.cpu, s.cpu, s.priority, CASE WHEN s.is_on THEN k.event_id END
+        s.cpu, s.cpu, s.priority,
+        CASE WHEN s.is_on THEN k.event_id END
     FROM step AS s
     JOIN life AS f ON s.thread_id = f.thread_id AND s.tid = f.tid
     LEFT JOIN waking AS k ON s.thread_id = k.thread_id AND s.tid = k.tid AND k.number IS NULL

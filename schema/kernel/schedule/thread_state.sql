@@ -36,7 +36,8 @@ SELECT
     i.thread_id, i.start_ns, i.end_ns, i.state, i.cpu, i.priority,
     p.preemptor_thread_id AS preempted_by_thread_id,
     p.preemptor_other_thread_id AS preempted_by_other_thread_id,
-    p.preemptor_priority AS preempted_by_priority, w.kind AS waker_kind,
+    p.preemptor_priority AS preempted_by_priority,
+    w.kind AS waker_kind,
     wt.thread_id AS waker_thread_id,
     CASE WHEN wt.thread_id IS NULL THEN wo.other_thread_id END AS waker_other_thread_id,
     coalesce(l.until_ns > i.start_ns, false) AS is_loss_affected

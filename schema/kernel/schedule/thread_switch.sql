@@ -8,7 +8,10 @@
 -- Each reader joins a part of them: a copy of all switches would take much memory.
 WITH switch AS NOT MATERIALIZED (
     SELECT
-        w.trace_index, w.event_id, w.ts_ns + s.shift_ns AS at_ns, s.clock_key, w.cpu_id AS cpu,
+        w.trace_index, w.event_id,
+        w.ts_ns + s.shift_ns AS at_ns,
+        s.clock_key,
+        w.cpu_id AS cpu,
         w.prev_tid, w.prev_state, w.next_tid, s.shift_ns,
         w.prev_prio + CASE WHEN o.tracer LIKE 'perf%' THEN 0 ELSE 100 END AS prev_priority,
         w.next_prio + CASE WHEN o.tracer LIKE 'perf%' THEN 0 ELSE 100 END AS next_priority
@@ -18,7 +21,9 @@ WITH switch AS NOT MATERIALIZED (
     WHERE s.is_joined
 ),
 unseen AS (
-    SELECT w.event_id, b.ts_ns AS since_ns
+    SELECT
+        w.event_id,
+        b.ts_ns AS since_ns
     FROM raw.sched_switch AS w
     JOIN raw.sched_switch AS b
         ON w.trace_index = b.trace_index
@@ -27,21 +32,29 @@ unseen AS (
     WHERE w.run_start_ns IS NULL AND w.prev_tid IN (SELECT tid FROM staging.thread_tid)
 )
 SELECT
-    t.thread_id, t.tid, w.trace_index, w.event_id, w.at_ns, w.cpu, true AS is_on,
-    NULL::BIGINT AS unseen_since_ns, w.next_priority AS priority, NULL::BIGINT AS prev_state
+    t.thread_id, t.tid, w.trace_index, w.event_id, w.at_ns, w.cpu,
+    true AS is_on,
+    NULL::BIGINT AS unseen_since_ns,
+    w.next_priority AS priority,
+    NULL::BIGINT AS prev_state
 FROM switch AS w
 JOIN staging.thread_tid AS t ON staging.has_tid(t, w.clock_key, w.next_tid, w.at_ns)
 UNION ALL
 SELECT
     t.thread_id, t.tid, w.trace_index, w.event_id, w.at_ns, w.cpu, false,
-    u.since_ns + w.shift_ns, w.prev_priority, w.prev_state
+    u.since_ns + w.shift_ns,
+    w.prev_priority, w.prev_state
 FROM switch AS w
 LEFT JOIN unseen AS u ON w.event_id = u.event_id
 JOIN staging.thread_tid AS t ON staging.has_tid(t, w.clock_key, w.prev_tid, w.at_ns)
 UNION ALL
 SELECT
-    t.thread_id, t.tid, s.trace_index, min(m.event_id), min(m.at_ns) + s.shift_ns, w.cpu, true,
-    u.since_ns + s.shift_ns, w.prev_priority, NULL
+    t.thread_id, t.tid, s.trace_index,
+    min(m.event_id),
+    min(m.at_ns) + s.shift_ns,
+    w.cpu, true,
+    u.since_ns + s.shift_ns,
+    w.prev_priority, NULL
 FROM staging.schedule_moment AS m
 JOIN staging.schedule AS s ON m.candidate_number = s.candidate_number
 JOIN switch AS w ON m.contradiction_id = w.event_id

@@ -5,8 +5,10 @@
 -- when: staging.schedule
 WITH ran AS (
     SELECT
-        x.thread_id, m.tid, count(*) AS event_count,
-        min(m.at_ns + s.shift_ns) AS first_ns, max(m.at_ns + s.shift_ns) AS last_ns
+        x.thread_id, m.tid,
+        count(*) AS event_count,
+        min(m.at_ns + s.shift_ns) AS first_ns,
+        max(m.at_ns + s.shift_ns) AS last_ns
     FROM staging.schedule_moment AS m
     JOIN staging.schedule AS s ON m.candidate_number = s.candidate_number
     JOIN staging.thread AS x

@@ -18,8 +18,9 @@ WITH waking AS (
 ),
 woken AS (
     SELECT
-        t.thread_id, t.tid, k.event_id, k.ts_ns + s.shift_ns AS at_ns, s.clock_key, s.shift_ns,
-        k.target_cpu, k.switch_event_id, k.interrupt
+        t.thread_id, t.tid, k.event_id,
+        k.ts_ns + s.shift_ns AS at_ns,
+        s.clock_key, s.shift_ns, k.target_cpu, k.switch_event_id, k.interrupt
     FROM waking AS k
     JOIN staging.schedule AS s ON k.trace_index = s.trace_index
     JOIN staging.thread_tid AS t ON staging.has_tid(t, s.clock_key, k.tid, k.ts_ns + s.shift_ns)
@@ -27,12 +28,17 @@ woken AS (
 ),
 during AS (
     SELECT
-        w.*, r.trace_index, r.cpu_id AS cpu, r.ts_ns + w.shift_ns AS from_ns, r.next_tid,
-        r.next_comm, e.number IS NOT NULL AS is_contradicted
+        w.*, r.trace_index,
+        r.cpu_id AS cpu,
+        r.ts_ns + w.shift_ns AS from_ns,
+        r.next_tid, r.next_comm,
+        e.number IS NOT NULL AS is_contradicted
     FROM woken AS w
     LEFT JOIN raw.sched_switch AS r ON w.switch_event_id = r.event_id
     LEFT JOIN (
-        SELECT trace_index, cpu_id, switch_number - 1 AS number
+        SELECT
+            trace_index, cpu_id,
+            switch_number - 1 AS number
         FROM raw.sched_switch
         WHERE run_start_ns IS NULL
     ) AS e

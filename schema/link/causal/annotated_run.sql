@@ -21,8 +21,9 @@ WITH instance AS (
 FROM instance
 UNION ALL
 SELECT
-    t.run_id, t.subscription_id, -t.take_id, t.trace_id, t.thread_id, t.taken_ns,
-    t.start_event_id, t.start_event_id
+    t.run_id, t.subscription_id,
+    -t.take_id,
+    t.trace_id, t.thread_id, t.taken_ns, t.start_event_id, t.start_event_id
 FROM store.take AS t
 WHERE t.run_id = only_run
     AND t.subscription_id IN (

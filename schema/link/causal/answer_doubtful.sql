@@ -34,7 +34,9 @@ own AS MATERIALIZED (
 ),
 since AS MATERIALIZED (
     SELECT
-        publication_id, NULL::BIGINT AS take_id, trace_id, start_ns,
+        publication_id,
+        NULL::BIGINT AS take_id,
+        trace_id, start_ns,
         start_ns - interval_ns AS taken_ns
     FROM own
 ),
@@ -93,7 +95,9 @@ usual AS (
         quantile_disc(number, 0.5) AS usual_number,
         count(*) >= 5 AND quantile_disc(number, 0.1) < quantile_disc(number, 0.9) AS differs
     FROM (
-        SELECT subscription_id, publisher_id, sum(number) AS number
+        SELECT
+            subscription_id, publisher_id,
+            sum(number) AS number
         FROM follower
         GROUP BY subscription_id, publisher_id, take_id
     )

@@ -38,7 +38,8 @@ taking AS MATERIALIZED (
 ),
 sent AS MATERIALIZED (
     SELECT
-        t.take_id, b.publisher_id, i.take_id AS cause_id,
+        t.take_id, b.publisher_id,
+        i.take_id AS cause_id,
         coalesce(nullif(t.source_timestamp_ns, 0), b.start_ns) AS stamp_ns,
         CASE
             WHEN
@@ -58,19 +59,25 @@ sent AS MATERIALIZED (
     WHERE t.run_id IN (SELECT run_id FROM input) AND l.run_id = only_run AND b.run_id = only_run
 ),
 origin (take_id, cause_id, publisher_ids, made_ns) AS (
-    SELECT s.take_id, s.cause_id, [s.publisher_id], s.stamp_ns - s.working_ns
+    SELECT
+        s.take_id, s.cause_id,
+        [s.publisher_id],
+        s.stamp_ns - s.working_ns
     FROM sent AS s
     SEMI JOIN input AS i ON s.take_id = i.take_id
     UNION ALL
     SELECT
-        o.take_id, s.cause_id, list_append(o.publisher_ids, s.publisher_id),
+        o.take_id, s.cause_id,
+        list_append(o.publisher_ids, s.publisher_id),
         s.stamp_ns - s.working_ns
     FROM origin AS o
     JOIN sent AS s ON o.cause_id = s.take_id
     WHERE NOT list_contains(o.publisher_ids, s.publisher_id)
 ),
 made AS (
-    SELECT take_id, CASE WHEN count(*) = count(made_ns) THEN min(made_ns) END AS made_ns
+    SELECT
+        take_id,
+        CASE WHEN count(*) = count(made_ns) THEN min(made_ns) END AS made_ns
     FROM origin
     GROUP BY take_id
 )

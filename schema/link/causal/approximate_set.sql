@@ -28,7 +28,9 @@ WITH follower AS MATERIALIZED (
 around AS MATERIALIZED (
     SELECT
         p.annotation_id, p.pivot_id, p.pivot_ns, p.pivot_age_ns, p.subscription_id,
-        l.stamp_ns AS last_ns, l.start_ns AS last_start_ns, l.start_event_id AS last_event_id,
+        l.stamp_ns AS last_ns,
+        l.start_ns AS last_start_ns,
+        l.start_event_id AS last_event_id,
         l.age_ns, l.next_ns, l.next_event_id, l.next_age_ns, l.is_set_back,
         -- Where it goes on after it waited for this input: those with older messages have come.
         CASE
@@ -37,8 +39,11 @@ around AS MATERIALIZED (
         END AS resumed_event_id
     FROM (
         SELECT
-            m.annotation_id, m.callback_instance_id AS pivot_id, m.stamp_ns AS pivot_ns,
-            m.age_ns AS pivot_age_ns, i.subscription_id,
+            m.annotation_id,
+            m.callback_instance_id AS pivot_id,
+            m.stamp_ns AS pivot_ns,
+            m.age_ns AS pivot_age_ns,
+            i.subscription_id,
             count(*) OVER (PARTITION BY m.annotation_id, m.callback_instance_id) AS input_count
         FROM follower AS m
         JOIN store.annotation_input AS i ON m.annotation_id = i.annotation_id
@@ -53,7 +58,12 @@ around AS MATERIALIZED (
     QUALIFY count(*) OVER (PARTITION BY p.annotation_id, p.pivot_id) = p.input_count
 ),
 -- Moments that a set may start at: no later one has the same messages.
-start AS (SELECT annotation_id, pivot_id, pivot_ns, last_ns AS start_ns FROM around),
+start AS (
+    SELECT
+        annotation_id, pivot_id, pivot_ns,
+        last_ns AS start_ns
+    FROM around
+),
 possible AS MATERIALIZED (
     SELECT
         s.annotation_id, s.pivot_id, s.start_ns,
@@ -104,11 +114,17 @@ excluded AS (
     GROUP BY s.annotation_id, s.pivot_id, s.start_ns
 ),
 known AS (
-    SELECT annotation_id, pivot_id, max(event_id) AS event_id
+    SELECT
+        annotation_id, pivot_id,
+        max(event_id) AS event_id
     FROM (
-        SELECT annotation_id, pivot_id, start_event_id AS event_id FROM member
+        SELECT
+            annotation_id, pivot_id,
+            start_event_id AS event_id
+        FROM member
         UNION ALL
-        SELECT annotation_id, pivot_id, event_id FROM excluded
+        SELECT annotation_id, pivot_id, event_id
+        FROM excluded
     )
     GROUP BY annotation_id, pivot_id
     HAVING count(*) = count(event_id)

@@ -14,7 +14,9 @@
 CREATE OR REPLACE MACRO derive.link_call(only_run) AS TABLE
 WITH taken AS (
     SELECT
-        receiver_thread_id AS thread_id, taken_ns, request_id AS taken_request_id,
+        receiver_thread_id AS thread_id,
+        taken_ns,
+        request_id AS taken_request_id,
         NULL::BIGINT AS taken_response_id
     FROM store.request
     WHERE run_id = only_run AND callback_instance_id IS NULL
@@ -39,7 +41,10 @@ answered AS (
     WHERE r.run_id = only_run
 ),
 turn AS (
-    SELECT k.thread_id, k.taken_ns AS at_ns, k.taken_request_id, k.taken_response_id
+    SELECT
+        k.thread_id,
+        k.taken_ns AS at_ns,
+        k.taken_request_id, k.taken_response_id
     FROM taken AS k
     SEMI JOIN executing AS e ON k.thread_id = e.thread_id
     UNION ALL
@@ -63,8 +68,13 @@ turn AS (
 -- Inside of no callback instance, or of one of another node.
 sent AS (
     SELECT
-        b.thread_id, b.start_ns AS sent_ns, 'publisher' AS kind, b.publisher_id AS object_id,
-        b.publication_id, NULL::BIGINT AS request_id, NULL::BIGINT AS response_id,
+        b.thread_id,
+        b.start_ns AS sent_ns,
+        'publisher' AS kind,
+        b.publisher_id AS object_id,
+        b.publication_id,
+        NULL::BIGINT AS request_id,
+        NULL::BIGINT AS response_id,
         CASE WHEN d.publication_id IS NOT NULL THEN p.node_id END AS only_node_id
     FROM store.publication AS b
     SEMI JOIN taken AS k ON b.thread_id = k.thread_id
@@ -120,7 +130,8 @@ independent AS (
     WHERE taken_request_id IS NULL AND taken_response_id IS NULL
 )
 SELECT
-    only_run AS run_id, l.taken_request_id, l.taken_response_id, l.publication_id,
+    only_run AS run_id,
+    l.taken_request_id, l.taken_response_id, l.publication_id,
     CASE l.kind WHEN 'publisher' THEN l.object_id END AS publisher_id,
     l.request_id, l.response_id,
     1 + (i.thread_id IS NOT NULL OR coalesce(p.is_ambiguous, false))::BIGINT AS candidate_count
@@ -136,11 +147,13 @@ WHERE l.taken_response_id IS NOT NULL
 UNION ALL
 SELECT
     only_run, NULL, i.response_id, s.publication_id, s.publisher_id, s.request_id,
-    s.sent_response_id, 1 + p.is_ambiguous::BIGINT
+    s.sent_response_id,
+    1 + p.is_ambiguous::BIGINT
 FROM store.callback_instance AS i
 JOIN (
     SELECT
-        callback_instance_id, publication_id, publisher_id, NULL::BIGINT AS request_id,
+        callback_instance_id, publication_id, publisher_id,
+        NULL::BIGINT AS request_id,
         NULL::BIGINT AS sent_response_id
     FROM derive.link_causal_direct(only_run)
     UNION ALL

@@ -6,8 +6,10 @@
 CREATE OR REPLACE MACRO derive.link_causal(only_run) AS TABLE
 WITH link AS (
     SELECT
-        run_id, callback_instance_id, take_id, publication_id, publisher_id, 'direct' AS kind,
-        NULL::BIGINT AS annotation_id, candidate_count, is_loss_affected
+        run_id, callback_instance_id, take_id, publication_id, publisher_id,
+        'direct' AS kind,
+        NULL::BIGINT AS annotation_id,
+        candidate_count, is_loss_affected
     FROM derive.link_causal_direct(only_run) AS d
     ANTI JOIN (FROM store.link_call WHERE run_id = only_run) AS l
         ON d.publication_id = l.publication_id

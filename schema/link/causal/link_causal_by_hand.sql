@@ -32,8 +32,11 @@ doubtful AS (
 ),
 link AS (
     SELECT
-        a.run_id, NULL::BIGINT AS callback_instance_id, a.take_id, a.publication_id,
-        a.publisher_id, 'take_adjacent' AS kind, NULL::BIGINT AS annotation_id,
+        a.run_id,
+        NULL::BIGINT AS callback_instance_id,
+        a.take_id, a.publication_id, a.publisher_id,
+        'take_adjacent' AS kind,
+        NULL::BIGINT AS annotation_id,
         CASE WHEN d.publication_id IS NULL THEN 1 ELSE 2 END AS candidate_count,
         t.is_loss_affected OR b.is_loss_affected AS is_loss_affected
     FROM adjacent AS a

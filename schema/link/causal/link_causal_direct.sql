@@ -9,7 +9,9 @@ CREATE OR REPLACE MACRO derive.link_causal_direct(only_run) AS TABLE
 WITH RECURSIVE around AS (
     SELECT
         b.run_id, b.publication_id, b.publisher_id, b.is_loss_affected,
-        b.start_event_id AS event_id, i.parent_id, i.end_event_id IS NULL AS is_doubtful
+        b.start_event_id AS event_id,
+        i.parent_id,
+        i.end_event_id IS NULL AS is_doubtful
     FROM store.publication AS b
     JOIN store.callback_instance AS i ON b.callback_event_id = i.start_event_id
     WHERE b.run_id = only_run
@@ -35,7 +37,8 @@ inside AS (
     SELECT
         b.run_id, i.continues_id, i.callback_instance_id, b.publication_id, i.take_id,
         b.publisher_id,
-        i.is_loss_affected OR b.is_loss_affected AS is_loss_affected, 1::BIGINT AS candidate_count
+        i.is_loss_affected OR b.is_loss_affected AS is_loss_affected,
+        1::BIGINT AS candidate_count
     FROM store.publication AS b
     JOIN store.callback_instance AS i ON b.callback_event_id = i.start_event_id
     WHERE b.run_id = only_run
@@ -45,15 +48,18 @@ inside AS (
     SELECT
         a.run_id, i.continues_id, i.callback_instance_id, a.publication_id, i.take_id,
         a.publisher_id,
-        i.is_loss_affected OR a.is_loss_affected, 1 + a.is_doubtful::BIGINT
+        i.is_loss_affected OR a.is_loss_affected,
+        1 + a.is_doubtful::BIGINT
     FROM around AS a
     JOIN store.callback_instance AS i ON a.parent_id = i.callback_instance_id
     WHERE a.event_id < i.effective_end_event_id
 )
 SELECT
-    d.run_id, coalesce(f.callback_instance_id, d.callback_instance_id) AS callback_instance_id,
-    d.publication_id, coalesce(f.take_id, d.take_id) AS take_id, d.publisher_id,
-    d.is_loss_affected, d.candidate_count
+    d.run_id,
+    coalesce(f.callback_instance_id, d.callback_instance_id) AS callback_instance_id,
+    d.publication_id,
+    coalesce(f.take_id, d.take_id) AS take_id,
+    d.publisher_id, d.is_loss_affected, d.candidate_count
 FROM inside AS d
 LEFT JOIN (
     SELECT callback_instance_id, take_id

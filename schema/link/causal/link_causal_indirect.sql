@@ -35,8 +35,8 @@ firing AS MATERIALIZED (
 demand AS MATERIALIZED (
     SELECT
         b.run_id, b.annotation_id, b.kind, b.publication_id,
-        b.callback_instance_id AS publishing_id, b.trace_id, b.thread_id, b.start_ns,
-        b.start_event_id, b.cut_event_id, i.subscription_id,
+        b.callback_instance_id AS publishing_id,
+        b.trace_id, b.thread_id, b.start_ns, b.start_event_id, b.cut_event_id, i.subscription_id,
         CASE
             WHEN n.parent_id IS NULL THEN coalesce(f.first_event_id, b.start_event_id)
             ELSE b.start_event_id
@@ -142,7 +142,9 @@ at_cut AS MATERIALIZED (
     WHERE e.effective_end_event_id > c.emptied_event_id
 ),
 there AS MATERIALIZED (
-    SELECT d.*, c.callback_instance_id, c.start_event_id AS input_start_event_id
+    SELECT
+        d.*, c.callback_instance_id,
+        c.start_event_id AS input_start_event_id
     FROM demand AS d
     LEFT JOIN at_cut AS c
         ON d.annotation_id = c.annotation_id
@@ -176,7 +178,8 @@ possible AS (
         SELECT
             t.annotation_id, t.publication_id, t.subscription_id, t.read_event_id,
             greatest(t.input_start_event_id, t.kept_event_id) AS since_event_id,
-            b.run_count AS begun_count, b.last_id
+            b.run_count AS begun_count,
+            b.last_id
         FROM there AS t
         ASOF JOIN begun AS b
             ON t.annotation_id = b.annotation_id
@@ -229,7 +232,8 @@ cached AS (
 linked AS (
     SELECT
         run_id, annotation_id, kind, publication_id, callback_instance_id, candidate_count,
-        trace_id, thread_id, start_ns, start_event_id, NULL::BIGINT AS since_ns
+        trace_id, thread_id, start_ns, start_event_id,
+        NULL::BIGINT AS since_ns
     FROM cached
     UNION ALL
     SELECT
@@ -247,7 +251,9 @@ found AS MATERIALIZED (
     SELECT
         c.run_id, c.annotation_id, c.kind, c.publication_id, c.callback_instance_id,
         c.candidate_count, c.trace_id, c.thread_id, c.start_ns, c.start_event_id,
-        i.trace_id AS input_trace_id, i.thread_id AS input_thread_id, i.start_ns AS input_start_ns,
+        i.trace_id AS input_trace_id,
+        i.thread_id AS input_thread_id,
+        i.start_ns AS input_start_ns,
         least(c.since_ns, i.start_ns) AS since_ns,
         i.start_event_id AS input_start_event_id
     FROM linked AS c

@@ -64,7 +64,9 @@ linked AS MATERIALIZED (
         AND p.subscription_id = t.subscription_id
         AND p.start_event_id > t.start_event_id
 )
-SELECT only_run AS run_id, l.take_id, l.publication_id, l.publisher_id, l.is_loss_affected
+SELECT
+    only_run AS run_id,
+    l.take_id, l.publication_id, l.publisher_id, l.is_loss_affected
 FROM linked AS l
 ANTI JOIN derive.take_behind_gap('linked') AS g
     ON l.publication_id = g.publication_id AND l.take_id = g.take_id

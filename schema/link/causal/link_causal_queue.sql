@@ -14,7 +14,8 @@ CREATE OR REPLACE MACRO derive.link_causal_queue(only_run, publications, runs) A
 WITH message AS (
     SELECT
         a.annotation_id, a.queue_depth, r.subscription_id, r.callback_instance_id, r.thread_id,
-        r.start_event_id, s.created_ns IS NULL AS is_old,
+        r.start_event_id,
+        s.created_ns IS NULL AS is_old,
         row_number() OVER (
             PARTITION BY a.annotation_id, r.subscription_id ORDER BY r.start_event_id
         ) AS number
@@ -26,7 +27,8 @@ WITH message AS (
 ),
 published AS (
     SELECT
-        b.*, i.subscription_id AS input_id,
+        b.*,
+        i.subscription_id AS input_id,
         row_number() OVER (
             PARTITION BY b.annotation_id, i.subscription_id, b.publisher_id
             ORDER BY b.start_event_id
@@ -38,7 +40,8 @@ published AS (
 -- How many messages had come, and how many publications too many there were.
 counted AS (
     SELECT
-        p.*, m.queue_depth, coalesce(m.number, 0) AS come_count,
+        p.*, m.queue_depth,
+        coalesce(m.number, 0) AS come_count,
         greatest(0, max(p.number - coalesce(m.number, 0)) OVER so_far) AS surplus_count,
         greatest(
             0, max(p.number - coalesce(m.number, 0)) OVER (
@@ -57,7 +60,8 @@ counted AS (
 ),
 answer AS (
     SELECT
-        *, number - surplus_count AS answer_number,
+        *,
+        number - surplus_count AS answer_number,
         lag(come_count) OVER in_order AS come_before_count
     FROM counted
     WINDOW in_order AS (PARTITION BY annotation_id, input_id, publisher_id ORDER BY start_event_id)
@@ -85,7 +89,9 @@ moved AS (
     FROM answer
 ),
 broken AS (
-    SELECT thread_id, min(resumed_event_id) AS event_id
+    SELECT
+        thread_id,
+        min(resumed_event_id) AS event_id
     FROM store.thread_break
     WHERE run_id = only_run
     GROUP BY thread_id

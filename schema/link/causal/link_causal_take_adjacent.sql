@@ -8,7 +8,10 @@
 -- grain: one row per publication made after a take without a callback
 CREATE OR REPLACE MACRO derive.link_causal_take_adjacent(only_run) AS TABLE
 WITH by_hand AS (
-    SELECT run_id, thread_id, start_event_id AS event_id, take_id, subscription_id, taken_ns
+    SELECT
+        run_id, thread_id,
+        start_event_id AS event_id,
+        take_id, subscription_id, taken_ns
     FROM derive.take_by_hand(only_run) AS t
     ANTI JOIN (
         SELECT p.process_id
@@ -23,8 +26,9 @@ turn AS (
     SELECT run_id, thread_id, event_id, take_id, subscription_id, taken_ns FROM by_hand
     UNION ALL
     SELECT
-        i.run_id, i.thread_id, unnest([i.start_event_id, i.effective_end_event_id]), NULL, NULL,
-        NULL
+        i.run_id, i.thread_id,
+        unnest([i.start_event_id, i.effective_end_event_id]),
+        NULL, NULL, NULL
     FROM store.callback_instance AS i
     SEMI JOIN busy AS w ON i.run_id = w.run_id AND i.thread_id = w.thread_id
     WHERE i.run_id = only_run
@@ -54,7 +58,10 @@ adjacent AS MATERIALIZED (
 ),
 -- Requests and responses that the thread took. Only their times are stored, not their events.
 called AS (
-    SELECT q.run_id, q.receiver_thread_id AS thread_id, q.taken_ns
+    SELECT
+        q.run_id,
+        q.receiver_thread_id AS thread_id,
+        q.taken_ns
     FROM store.request AS q
     SEMI JOIN busy AS w ON q.run_id = w.run_id AND q.receiver_thread_id = w.thread_id
     WHERE q.run_id = only_run

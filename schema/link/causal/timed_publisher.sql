@@ -16,7 +16,9 @@
 --     publisher's publication before)
 CREATE OR REPLACE MACRO derive.timed_publisher(only_run, followers) AS TABLE
 WITH timer AS (
-    SELECT process_id, period_ns, min(created_ns) AS created_ns
+    SELECT
+        process_id, period_ns,
+        min(created_ns) AS created_ns
     FROM store.timer
     WHERE run_id = only_run AND period_ns > 0
     GROUP BY process_id, period_ns
@@ -29,7 +31,9 @@ late AS (
             - (f.start_ns - f.interval_ns - t.created_ns) // t.period_ns AS times_due,
         coalesce(f.rest_ns <= t.period_ns, true) AS ends_in_period
     FROM (
-        SELECT *, min(start_ns) OVER (PARTITION BY publisher_id) AS first_ns
+        SELECT
+            *,
+            min(start_ns) OVER (PARTITION BY publisher_id) AS first_ns
         FROM query_table(followers)
     ) AS f
     JOIN timer AS t ON f.process_id = t.process_id AND t.created_ns < f.first_ns

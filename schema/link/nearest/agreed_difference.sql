@@ -7,9 +7,14 @@
 -- param: intervals VARCHAR  Name of rows of clock_id, stretch, least_ns, greatest_ns
 CREATE OR REPLACE MACRO derive.agreed_difference(intervals) AS TABLE
 WITH edge AS (
-    SELECT clock_id, stretch, least_ns AS from_ns, 1 AS step FROM query_table(intervals)
+    SELECT
+        clock_id, stretch,
+        least_ns AS from_ns,
+        1 AS step
+    FROM query_table(intervals)
     UNION ALL
-    SELECT clock_id, stretch, greatest_ns, -1 FROM query_table(intervals)
+    SELECT clock_id, stretch, greatest_ns, -1
+    FROM query_table(intervals)
 ),
 level AS MATERIALIZED (
     SELECT
@@ -20,7 +25,11 @@ level AS MATERIALIZED (
     WINDOW by_difference AS (PARTITION BY clock_id, stretch ORDER BY from_ns, step)
 ),
 most AS (
-    SELECT clock_id, stretch, max(vote_count) AS most_count FROM level GROUP BY clock_id, stretch
+    SELECT
+        clock_id, stretch,
+        max(vote_count) AS most_count
+    FROM level
+    GROUP BY clock_id, stretch
 ),
 high AS (
     SELECT l.clock_id, l.stretch, l.from_ns, l.until_ns, l.vote_count, m.most_count

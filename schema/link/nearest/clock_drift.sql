@@ -5,7 +5,10 @@
 -- param: course VARCHAR  Name of rows of clock_id, segment, at_ns, difference_ns
 CREATE OR REPLACE MACRO derive.clock_drift(course) AS TABLE
 WITH piece AS (
-    SELECT clock_id, segment, min(at_ns) AS start_ns, max(at_ns) AS end_ns
+    SELECT
+        clock_id, segment,
+        min(at_ns) AS start_ns,
+        max(at_ns) AS end_ns
     FROM query_table(course)
     GROUP BY clock_id, segment
 )

@@ -35,7 +35,10 @@ followed AS (
     FROM region
     GROUP BY clock_id
     UNION ALL
-    SELECT clock_id, number, segment + near.is_set::INTEGER, stretch, near
+    SELECT
+        clock_id, number,
+        segment + near.is_set::INTEGER,
+        stretch, near
     FROM (
         SELECT
             f.clock_id, r.number, f.segment, r.stretch,

@@ -51,7 +51,8 @@ beside AS (
         m.taken_ns, p.*
     FROM (
         SELECT
-            m.*, t.thread_id, unnest([stamped_ns - slack_ns, stamped_ns + slack_ns]) AS near_ns
+            m.*, t.thread_id,
+            unnest([stamped_ns - slack_ns, stamped_ns + slack_ns]) AS near_ns
         FROM message AS m
         JOIN (SELECT DISTINCT publisher_id, thread_id FROM published) AS t
             ON m.publisher_id = t.publisher_id
@@ -80,7 +81,10 @@ strange AS MATERIALIZED (
     SELECT DISTINCT m.topic_name
     FROM message AS m
     JOIN (
-        SELECT topic_name, min(written_ns) AS first_ns, max(written_ns) AS last_ns
+        SELECT
+            topic_name,
+            min(written_ns) AS first_ns,
+            max(written_ns) AS last_ns
         FROM published
         GROUP BY topic_name
     ) AS p ON m.topic_name = p.topic_name
@@ -96,7 +100,12 @@ usual AS (
         publisher_id,
         derive.clock_limit().usual_factor * any_value(median_ns) AS limit_ns,
         quantile_disc(delay_ns, derive.clock_limit().usual_quantile) AS latest_ns
-    FROM (SELECT *, median(delay_ns) OVER (PARTITION BY clock_id) AS median_ns FROM within)
+    FROM (
+        SELECT
+            *,
+            median(delay_ns) OVER (PARTITION BY clock_id) AS median_ns
+        FROM within
+    )
     WHERE goes_on AND place = 1
     GROUP BY publisher_id
 ),
@@ -126,7 +135,8 @@ owned AS MATERIALIZED (
 left_over AS (
     SELECT
         c.topic_name, c.publisher_id, c.source_timestamp_ns, c.only_subscription_id,
-        c.publication_id, c.is_missed OR c.is_late OR coalesce(o.is_rivalled, false) AS is_doubtful,
+        c.publication_id,
+        c.is_missed OR c.is_late OR coalesce(o.is_rivalled, false) AS is_doubtful,
         count(*) OVER (
             PARTITION BY c.topic_name, c.source_timestamp_ns, c.only_subscription_id
         ) AS candidate_count

@@ -106,7 +106,8 @@ SELECT
     clock_id,
     CASE WHEN NOT bool_or(is_first) THEN min(start_ns) END AS start_ns,
     CASE WHEN NOT bool_or(is_last) THEN max(end_ns) END AS end_ns,
-    middle_ns AS at_ns, difference_ns, drift_ppb, slack_ns
+    middle_ns AS at_ns,
+    difference_ns, drift_ppb, slack_ns
 FROM run
 WHERE is_certain
 GROUP BY clock_id, place, middle_ns, difference_ns, drift_ppb, slack_ns

@@ -10,13 +10,21 @@
 CREATE OR REPLACE MACRO derive.stamp_line(pairs, course) AS TABLE
 WITH drift AS (FROM derive.clock_drift(course)),
 trial AS (
-    SELECT clock_id, segment, middle_ns, 0 AS drift_ppb, 2 * segment AS place FROM drift
+    SELECT
+        clock_id, segment, middle_ns, 0 AS drift_ppb,
+        2 * segment AS place
+    FROM drift
     UNION ALL
-    SELECT clock_id, segment, middle_ns, drift_ppb, 2 * segment + 1 FROM drift
+    SELECT
+        clock_id, segment, middle_ns, drift_ppb,
+        2 * segment + 1
+    FROM drift
 ),
 allowed AS MATERIALIZED (
     SELECT
-        c.clock_id, c.stretch AS of_stretch, p.source_timestamp_ns,
+        c.clock_id,
+        c.stretch AS of_stretch,
+        p.source_timestamp_ns,
         t.place AS stretch,
         p.least_ns - ((p.source_timestamp_ns - t.middle_ns) * t.drift_ppb / 1e9)::BIGINT
             AS least_ns,
@@ -32,7 +40,8 @@ allowed AS MATERIALIZED (
 ),
 message AS (
     SELECT
-        clock_id, stretch AS place,
+        clock_id,
+        stretch AS place,
         count(DISTINCT source_timestamp_ns) AS message_count,
         count(DISTINCT of_stretch) AS stretch_count
     FROM allowed
@@ -40,7 +49,8 @@ message AS (
 ),
 line AS MATERIALIZED (
     SELECT
-        a.clock_id, t.segment, t.place, t.middle_ns, t.drift_ppb, max(a.vote_count) AS vote_count,
+        a.clock_id, t.segment, t.place, t.middle_ns, t.drift_ppb,
+        max(a.vote_count) AS vote_count,
         arg_max(a.difference_ns, (a.vote_count, a.difference_ns)) AS difference_ns,
         CASE
             WHEN any_value(m.stretch_count) < derive.clock_limit().sharp_stretches
@@ -68,9 +78,13 @@ judged AS (
     GROUP BY c.clock_id, c.stretch, l.segment, l.place
 ),
 chosen AS (
-    SELECT j.clock_id, arg_max(j.place, (j.agreeing_count, l.vote_count, -j.place)) AS place
+    SELECT
+        j.clock_id,
+        arg_max(j.place, (j.agreeing_count, l.vote_count, -j.place)) AS place
     FROM (
-        SELECT clock_id, segment, place, count_if(agrees) AS agreeing_count
+        SELECT
+            clock_id, segment, place,
+            count_if(agrees) AS agreeing_count
         FROM judged
         GROUP BY clock_id, segment, place
     ) AS j

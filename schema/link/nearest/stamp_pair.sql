@@ -57,7 +57,12 @@ placed AS (
     SELECT
         s.clock_id, s.publisher_id, s.stretch, s.source_timestamp_ns, s.taken_ns,
         s.earlier_timestamp_ns, p.position
-    FROM (SELECT *, unnest([source_timestamp_ns, taken_ns]) AS near_ns FROM sampled) AS s
+    FROM (
+        SELECT
+            *,
+            unnest([source_timestamp_ns, taken_ns]) AS near_ns
+        FROM sampled
+    ) AS s
     ASOF JOIN published AS p ON s.publisher_id = p.publisher_id AND s.near_ns >= p.written_ns
 ),
 paired AS (

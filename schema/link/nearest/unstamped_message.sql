@@ -6,7 +6,9 @@
 --     took it
 CREATE OR REPLACE MACRO derive.unstamped_message(only_run) AS TABLE
 WITH topic AS (
-    SELECT topic_name, bool_or(is_without_event) AS is_divided
+    SELECT
+        topic_name,
+        bool_or(is_without_event) AS is_divided
     FROM derive.unstamped_publication(only_run)
     GROUP BY topic_name
 ),

@@ -8,14 +8,16 @@
 CREATE OR REPLACE MACRO derive.topic_group(only_run) AS TABLE
 WITH RECURSIVE endpoint AS (
     SELECT
-        run_id, publisher_id AS vertex,
+        run_id,
+        publisher_id AS vertex,
         CASE WHEN NOT coalesce(is_topic_learned, false) THEN topic_name END AS topic_name,
         is_internal
     FROM store.publisher
     WHERE run_id = only_run
     UNION ALL
     SELECT
-        run_id, -subscription_id,
+        run_id,
+        -subscription_id,
         CASE WHEN NOT coalesce(is_topic_learned, false) THEN topic_name END,
         is_internal
     FROM store.subscription
@@ -23,7 +25,9 @@ WITH RECURSIVE endpoint AS (
 ),
 concerned AS (SELECT DISTINCT run_id FROM endpoint WHERE topic_name IS NULL),
 published AS (
-    SELECT b.run_id, b.source_timestamp_ns, any_value(b.publisher_id) AS publisher_id
+    SELECT
+        b.run_id, b.source_timestamp_ns,
+        any_value(b.publisher_id) AS publisher_id
     FROM store.publication AS b
     SEMI JOIN concerned AS c ON b.run_id = c.run_id
     WHERE b.run_id = only_run AND b.source_timestamp_ns <> 0
@@ -68,13 +72,17 @@ slot_use AS (
     )
 ),
 pair AS (
-    SELECT p.publisher_id, t.subscription_id, count(*) AS message_count
+    SELECT
+        p.publisher_id, t.subscription_id,
+        count(*) AS message_count
     FROM published AS p
     JOIN store.take AS t ON p.run_id = t.run_id AND p.source_timestamp_ns = t.source_timestamp_ns
     WHERE t.run_id = only_run AND p.publisher_id IS NOT NULL AND t.subscription_id IS NOT NULL
     GROUP BY p.publisher_id, t.subscription_id
     UNION ALL
-    SELECT b.publisher_id, t.subscription_id, count(*)
+    SELECT
+        b.publisher_id, t.subscription_id,
+        count(*)
     FROM slot_use AS s
     JOIN store.publication AS b ON s.publication_id = b.publication_id
     JOIN store.take AS t ON s.take_id = t.take_id
@@ -85,15 +93,21 @@ pair AS (
     GROUP BY b.publisher_id, t.subscription_id
 ),
 likely AS (
-    SELECT publisher_id, -subscription_id AS subscription_vertex
+    SELECT
+        publisher_id,
+        -subscription_id AS subscription_vertex
     FROM pair
     QUALIFY 10 * message_count >= max(message_count) OVER (PARTITION BY publisher_id)
         OR 10 * message_count >= max(message_count) OVER (PARTITION BY subscription_id)
 ),
 edge AS MATERIALIZED (
-    SELECT publisher_id AS from_vertex, subscription_vertex AS to_vertex FROM likely
+    SELECT
+        publisher_id AS from_vertex,
+        subscription_vertex AS to_vertex
+    FROM likely
     UNION ALL
-    SELECT subscription_vertex, publisher_id FROM likely
+    SELECT subscription_vertex, publisher_id
+    FROM likely
 ),
 reached (start, vertex) AS (
     SELECT vertex, vertex

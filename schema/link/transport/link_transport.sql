@@ -28,7 +28,9 @@ doubtful AS MATERIALIZED (
 ),
 guess AS (
     SELECT
-        l.run_id, l.take_id, b.trace_id AS sender_trace_id, t.trace_id AS receiver_trace_id,
+        l.run_id, l.take_id,
+        b.trace_id AS sender_trace_id,
+        t.trace_id AS receiver_trace_id,
         b.start_ns AS sent_ns,
         CASE WHEN bh.clock_id = th.clock_id THEN greatest(b.end_ns, t.taken_ns) ELSE b.end_ns END
             AS sent_until_ns,

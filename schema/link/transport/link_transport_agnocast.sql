@@ -10,8 +10,9 @@
 CREATE OR REPLACE MACRO derive.link_transport_agnocast(only_run) AS TABLE
 WITH published AS (
     SELECT
-        e.entry_id, b.publication_id, b.publisher_id, b.end_ns AS at_ns, p.topic_name, p.created_ns,
-        h.clock_id
+        e.entry_id, b.publication_id, b.publisher_id,
+        b.end_ns AS at_ns,
+        p.topic_name, p.created_ns, h.clock_id
     FROM store.agnocast_entry AS e
     JOIN store.publication AS b ON e.publication_id = b.publication_id
     JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
@@ -20,7 +21,10 @@ WITH published AS (
     WHERE e.run_id = only_run
 ),
 received AS (
-    SELECT e.entry_id, t.take_id, t.subscription_id, t.taken_ns AS at_ns, s.topic_name, h.clock_id
+    SELECT
+        e.entry_id, t.take_id, t.subscription_id,
+        t.taken_ns AS at_ns,
+        s.topic_name, h.clock_id
     FROM store.agnocast_entry AS e
     JOIN store.take AS t ON e.take_id = t.take_id
     JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
@@ -30,13 +34,18 @@ received AS (
 ),
 -- Publishers whose creation was not traced tell nothing.
 least AS (
-    SELECT clock_id, topic_name, min(entry_id) AS entry_id, any_value(created_ns) AS created_ns
+    SELECT
+        clock_id, topic_name,
+        min(entry_id) AS entry_id,
+        any_value(created_ns) AS created_ns
     FROM published
     WHERE created_ns IS NOT NULL
     GROUP BY clock_id, topic_name, publisher_id
 ),
 beginning AS (
-    SELECT l.clock_id, l.topic_name, l.created_ns AS at_ns
+    SELECT
+        l.clock_id, l.topic_name,
+        l.created_ns AS at_ns
     FROM least AS l
     ASOF JOIN published AS p
         ON l.clock_id = p.clock_id AND l.topic_name = p.topic_name AND l.created_ns > p.at_ns
@@ -45,13 +54,18 @@ beginning AS (
 candidate AS (
     SELECT t.take_id, t.subscription_id, t.at_ns, p.publication_id, p.publisher_id, p.sent_ns
     FROM (
-        SELECT t.*, b.at_ns AS begun_ns
+        SELECT
+            t.*,
+            b.at_ns AS begun_ns
         FROM received AS t
         ASOF LEFT JOIN beginning AS b
             ON t.clock_id = b.clock_id AND t.topic_name = b.topic_name AND t.at_ns >= b.at_ns
     ) AS t
     JOIN (
-        SELECT p.*, p.at_ns AS sent_ns, b.at_ns AS begun_ns
+        SELECT
+            p.*,
+            p.at_ns AS sent_ns,
+            b.at_ns AS begun_ns
         FROM published AS p
         ASOF LEFT JOIN beginning AS b
             ON p.clock_id = b.clock_id AND p.topic_name = b.topic_name AND p.at_ns >= b.at_ns

@@ -10,7 +10,9 @@
 -- param: has_unnamed BOOLEAN = true  Some topic is not known; false: none is looked for
 CREATE OR REPLACE MACRO derive.link_transport_exact(only_run, has_unnamed := true) AS TABLE
 WITH unnamed AS (
-    SELECT kind, id, 'group ' || group_id AS topic_name
+    SELECT
+        kind, id,
+        'group ' || group_id AS topic_name
     FROM derive.topic_group(only_run)
     WHERE has_unnamed AND topic_name IS NULL
 ),
@@ -53,8 +55,10 @@ repeated_take AS (
 candidate AS (
     SELECT
         r.run_id, r.take_id, r.subscription_id, r.source_timestamp_ns,
-        r.start_event_id AS take_event_id, p.publication_id, p.publisher_id,
-        p.start_event_id AS publication_event_id, r.topic_name AS take_topic,
+        r.start_event_id AS take_event_id,
+        p.publication_id, p.publisher_id,
+        p.start_event_id AS publication_event_id,
+        r.topic_name AS take_topic,
         coalesce(r.topic_name = p.topic_name, false) AS is_topic_known,
         CASE WHEN r.is_own_topic AND p.is_own_topic THEN 'exact' ELSE 'exact_stamp' END AS method,
         q.source_timestamp_ns IS NOT NULL OR u.source_timestamp_ns IS NOT NULL AS is_repeated

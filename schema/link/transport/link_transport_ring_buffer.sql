@@ -41,7 +41,9 @@ exposed AS (
     WHERE s.previous_trace_id <> s.trace_id
 ),
 behind_gap AS (
-    SELECT e.take_id, e.process_id, e.buffer_handle, e.at_ns - e.previous_ns AS stay_ns
+    SELECT
+        e.take_id, e.process_id, e.buffer_handle,
+        e.at_ns - e.previous_ns AS stay_ns
     FROM exposed AS e
     ASOF JOIN derive.recording_gap AS g ON e.recording_id = g.recording_id AND e.at_ns > g.start_ns
     WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns

@@ -6,7 +6,11 @@
 --     raw.ros2_message_link_periodic_async
 
 CREATE OR REPLACE TEMP TABLE annotation_event AS
-SELECT event_id, process_id, 'periodic_async' AS kind, subs AS inputs, pubs AS outputs
+SELECT
+    event_id, process_id,
+    'periodic_async' AS kind,
+    subs AS inputs,
+    pubs AS outputs
 FROM staging.located('raw.ros2_message_link_periodic_async')
 UNION ALL
 SELECT event_id, process_id, 'partial_sync', subs, pubs
@@ -16,10 +20,16 @@ SELECT event_id, process_id, 'approximate_sync', subs, pubs
 FROM staging.located('raw.ros2_message_link_approximate_sync');
 
 WITH input AS (
-    SELECT DISTINCT event_id, process_id, unnest(inputs) AS handle FROM annotation_event
+    SELECT DISTINCT
+        event_id, process_id,
+        unnest(inputs) AS handle
+    FROM annotation_event
 ),
 output AS (
-    SELECT DISTINCT event_id, process_id, unnest(outputs) AS handle FROM annotation_event
+    SELECT DISTINCT
+        event_id, process_id,
+        unnest(outputs) AS handle
+    FROM annotation_event
 ),
 input_by_handle AS (
     SELECT i.event_id, i.process_id, i.handle, s.subscription_id
@@ -53,12 +63,16 @@ output_by_handle AS (
 ),
 object AS (
     SELECT
-        i.event_id, 'input' AS side, i.handle,
+        i.event_id,
+        'input' AS side,
+        i.handle,
         coalesce(i.subscription_id, c.subscription_id) AS object_id
     FROM input_by_handle AS i
     LEFT JOIN input_by_callback AS c ON i.event_id = c.event_id AND i.handle = c.handle
     UNION ALL
-    SELECT o.event_id, 'output', o.handle, coalesce(o.publisher_id, p.publisher_id)
+    SELECT
+        o.event_id, 'output', o.handle,
+        coalesce(o.publisher_id, p.publisher_id)
     FROM output_by_handle AS o
     LEFT JOIN staging.publisher AS p
         ON p.is_inferred AND o.process_id = p.process_id AND o.handle = p.publisher_handle

@@ -3,7 +3,10 @@
 -- grain: one row per publication or take of Agnocast
 -- when: raw.agnocast_agnocast_publish, raw.agnocast_agnocast_create_callable,
 --     raw.agnocast_agnocast_take
-SELECT n.publication_id, NULL::BIGINT AS take_id, b.entry_id, b.event_id
+SELECT
+    n.publication_id,
+    NULL::BIGINT AS take_id,
+    b.entry_id, b.event_id
 FROM raw.agnocast_agnocast_publish AS b
 JOIN staging.publication_number AS n ON b.event_id = n.start_event_id
 UNION ALL

@@ -8,7 +8,8 @@ WITH failed AS (
 )
 SELECT
     f.trace_index + 1 AS trace_id,
-    s.subscription_id, f.process_id, f.thread_id, f.ts_ns AS failed_ns
+    s.subscription_id, f.process_id, f.thread_id,
+    f.ts_ns AS failed_ns
 FROM failed AS f
 ASOF JOIN staging.subscription_known AS k
     ON f.process_id = k.process_id

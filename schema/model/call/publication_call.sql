@@ -18,12 +18,16 @@ CREATE OR REPLACE TEMP TABLE middleware_write AS
 WITH write_begin AS (SELECT * FROM staging.call('dds_write_pre')),
 write_end AS (SELECT * FROM staging.call('dds_write')),
 pair AS (
-    SELECT b.event_id AS begin_event_id, e.event_id AS end_event_id
+    SELECT
+        b.event_id AS begin_event_id,
+        e.event_id AS end_event_id
     FROM write_begin AS b
     JOIN write_end AS e ON b.event_id = e.previous_event_id AND b.writer = e.writer
 ),
 reversed_pair AS (
-    SELECT b.event_id AS begin_event_id, e.event_id AS end_event_id
+    SELECT
+        b.event_id AS begin_event_id,
+        e.event_id AS end_event_id
     FROM write_end AS e
     JOIN write_begin AS b ON e.event_id = b.previous_event_id AND e.writer = b.writer
     WHERE e.event_id NOT IN (SELECT end_event_id FROM pair)
@@ -122,7 +126,9 @@ inter AS (
         ON w.last.event_id = c.previous_event_id AND w.message = coalesce(c.message, w.message)
 ),
 enqueued AS (
-    SELECT previous_event_id, arg_max(place, event_id) AS place
+    SELECT
+        previous_event_id,
+        arg_max(place, event_id) AS place
     FROM staging.call('ros2_rclcpp_ring_buffer_enqueue')
     GROUP BY previous_event_id
 ),
@@ -158,5 +164,6 @@ SELECT
     first.ts_ns AS start_ns,
     last.ts_ns AS end_ns,
     intra_ns, rclcpp_ns, rcl_ns, rmw_ns, dds_ns, publisher_handle, rmw_handle, writer,
-    stamp AS source_timestamp_ns, callback_event_id
+    stamp AS source_timestamp_ns,
+    callback_event_id
 FROM staging.located('complete')

@@ -10,7 +10,10 @@ WITH unstamped AS MATERIALIZED (
     WHERE source_timestamp_ns IS NULL AND coalesce(rmw_ns, rcl_ns) IS NOT NULL
 ),
 next_call AS (
-    SELECT u.start_event_id, min(e.event_id) AS event_id, min(e.ts_ns) AS ts_ns
+    SELECT
+        u.start_event_id,
+        min(e.event_id) AS event_id,
+        min(e.ts_ns) AS ts_ns
     FROM staging.predecessor AS e
     JOIN unstamped AS u ON e.previous_event_id = u.end_event_id
     -- What the user's own code records may be inside the call.
@@ -37,7 +40,9 @@ earlier AS (
     FROM next_call AS c
     FULL JOIN next_executor AS x USING (start_event_id)
 )
-SELECT e.start_event_id, e.ts_ns AS next_event_ns
+SELECT
+    e.start_event_id,
+    e.ts_ns AS next_event_ns
 FROM earlier AS e
 ANTI JOIN (
     SELECT event_id FROM staging.near_gap WHERE sequence IN ('call', 'executor') AND is_behind

@@ -7,17 +7,26 @@
 -- when: staging.publication_call
 WITH call AS NOT MATERIALIZED (
     SELECT
-        start_event_id AS event_id, process_id, publisher_handle AS handle, rmw_handle, writer,
+        start_event_id AS event_id,
+        process_id,
+        publisher_handle AS handle,
+        rmw_handle, writer,
         rclcpp_ns IS NULL AND intra_ns IS NULL AND publisher_handle IS NOT NULL
         AND rmw_handle IS NULL AND writer IS NULL AS may_be_rosout
     FROM staging.publication_call
 ),
 rcl_publisher AS (
-    SELECT event_id, process_id, publisher_handle AS handle FROM staging.publisher_known
+    SELECT
+        event_id, process_id,
+        publisher_handle AS handle
+    FROM staging.publisher_known
 ),
 by_rcl AS (SELECT * FROM staging.with_latest('call', 'rcl_publisher')),
 rosout AS (
-    SELECT process_id, count(*) AS publisher_count, min(event_id) AS publisher_event_id
+    SELECT
+        process_id,
+        count(*) AS publisher_count,
+        min(event_id) AS publisher_event_id
     FROM staging.publisher_known
     WHERE topic_name = '/rosout'
     GROUP BY process_id
@@ -39,13 +48,20 @@ not_by_rcl AS (
     LEFT JOIN rosout AS o ON c.process_id = o.process_id
 ),
 published AS (
-    SELECT event_id AS start_event_id, object_event_id AS publisher_event_id, false AS is_rosout
+    SELECT
+        event_id AS start_event_id,
+        object_event_id AS publisher_event_id,
+        false AS is_rosout
     FROM by_rcl
     WHERE object_event_id IS NOT NULL
     UNION ALL BY NAME
     SELECT
-        event_id AS start_event_id, publisher_event_id, is_rosout, process_id,
+        event_id AS start_event_id,
+        publisher_event_id, is_rosout, process_id,
         CASE WHEN publisher_event_id IS NULL THEN handle END AS unknown_handle
     FROM not_by_rcl
 )
-SELECT *, row_number() OVER (ORDER BY start_event_id) AS publication_id FROM published
+SELECT
+    *,
+    row_number() OVER (ORDER BY start_event_id) AS publication_id
+FROM published

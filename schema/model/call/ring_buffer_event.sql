@@ -5,7 +5,10 @@
 -- when: raw.ros2_rclcpp_construct_ring_buffer, raw.ros2_rclcpp_ring_buffer_clear,
 --     raw.ros2_rclcpp_ring_buffer_dequeue, raw.ros2_rclcpp_ring_buffer_enqueue
 WITH enqueue AS (
-    SELECT event_id, ts_ns, trace_index, process_id, thread_id, buffer, "index" AS slot, overwritten
+    SELECT
+        event_id, ts_ns, trace_index, process_id, thread_id, buffer,
+        "index" AS slot,
+        overwritten
     FROM staging.located('raw.ros2_rclcpp_ring_buffer_enqueue')
 ),
 cleared AS (
@@ -41,11 +44,13 @@ FROM enqueue AS e
 LEFT JOIN published AS b ON e.event_id = b.event_id
 UNION ALL
 SELECT
-    d.trace_index + 1, d.process_id, 'dequeue', d.buffer, d."index", d.ts_ns, NULL, t.take_id,
-    false, d.event_id
+    d.trace_index + 1,
+    d.process_id, 'dequeue', d.buffer, d."index", d.ts_ns, NULL, t.take_id, false, d.event_id
 FROM staging.located('raw.ros2_rclcpp_ring_buffer_dequeue') AS d
 LEFT JOIN staging.take_number AS t ON d.event_id = t.start_event_id
 UNION ALL
-SELECT trace_index + 1, process_id, 'clear', buffer, NULL, ts_ns, NULL, NULL, false, event_id
+SELECT
+    trace_index + 1,
+    process_id, 'clear', buffer, NULL, ts_ns, NULL, NULL, false, event_id
 FROM staging.located('cleared')
 ORDER BY event_id

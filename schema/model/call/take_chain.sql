@@ -26,10 +26,13 @@ WITH buffer AS (
     JOIN staging.subscription_object AS o ON i.event_id = o.event_id
 )
 SELECT
-    d.event_id AS start_event_id, d.event_id AS end_event_id, d.trace_index, d.thread_id,
-    d.process_id, d.ts_ns AS taken_ns,
+    d.event_id AS start_event_id,
+    d.event_id AS end_event_id,
+    d.trace_index, d.thread_id, d.process_id,
+    d.ts_ns AS taken_ns,
     'ring_buffer' AS method,
-    d.buffer AS buffer_handle, b.subscription_event_id,
+    d.buffer AS buffer_handle,
+    b.subscription_event_id,
     b.event_id IS NOT NULL AS is_known
 FROM staging.located('raw.ros2_rclcpp_ring_buffer_dequeue') AS d
 ASOF LEFT JOIN buffer AS b
@@ -44,21 +47,30 @@ ASOF LEFT JOIN buffer AS b
 CREATE OR REPLACE TEMP TABLE agnocast_take AS
 WITH called AS (
     SELECT
-        event_id, ts_ns, trace_index, thread_id, process_id, pid_callback_info_id AS handle
+        event_id, ts_ns, trace_index, thread_id, process_id,
+        pid_callback_info_id AS handle
     FROM staging.located('raw.agnocast_agnocast_create_callable')
 ),
 callback AS (
-    SELECT subscription_event_id AS event_id, process_id, callback_handle AS handle
+    SELECT
+        subscription_event_id AS event_id,
+        process_id,
+        callback_handle AS handle
     FROM staging.callback_known
     WHERE kind = 'subscription'
 ),
 polled AS (
-    SELECT event_id, ts_ns, trace_index, thread_id, process_id, subscription_handle AS handle
+    SELECT
+        event_id, ts_ns, trace_index, thread_id, process_id,
+        subscription_handle AS handle
     FROM staging.located('raw.agnocast_agnocast_take')
     WHERE message <> 0
 ),
 subscription AS (
-    SELECT event_id, process_id, subscription_handle AS handle FROM staging.subscription_known
+    SELECT
+        event_id, process_id,
+        subscription_handle AS handle
+    FROM staging.subscription_known
 )
 SELECT * RENAME (object_event_id AS subscription_event_id)
 FROM staging.with_latest('called', 'callback')
@@ -131,7 +143,8 @@ taken AS (
         t.event_id, t.end_event_id, t.trace_index, t.thread_id, t.process_id,
         coalesce(t.rmw_ns, t.rcl_ns, t.caret_ns) AS taken_ns,
         CASE WHEN t.rmw_ns IS NULL AND t.rcl_ns IS NULL THEN 'caret' ELSE 'rmw' END AS method,
-        t.rmw_handle AS handle, t.stamp
+        t.rmw_handle AS handle,
+        t.stamp
     FROM located AS t
     LEFT JOIN rcl_traced AS r ON t.process_id = r.process_id
     LEFT JOIN known_reader AS k ON t.process_id = k.process_id AND t.rmw_handle = k.rmw_handle
@@ -143,20 +156,30 @@ taken AS (
             AND (k.process_id IS NOT NULL OR r.process_id IS NULL)
         )
 ),
-subscription AS (SELECT event_id, process_id, rmw_handle AS handle FROM staging.subscription_known)
+subscription AS (
+    SELECT
+        event_id, process_id,
+        rmw_handle AS handle
+    FROM staging.subscription_known
+)
 SELECT
-    event_id AS start_event_id, end_event_id, trace_index, thread_id, process_id, taken_ns, method,
+    event_id AS start_event_id,
+    end_event_id, trace_index, thread_id, process_id, taken_ns, method,
     handle AS rmw_handle,
-    stamp AS source_timestamp_ns, object_event_id AS subscription_event_id,
+    stamp AS source_timestamp_ns,
+    object_event_id AS subscription_event_id,
     object_event_id IS NOT NULL AS is_known
 FROM staging.with_latest('taken', 'subscription')
 UNION ALL BY NAME
 FROM ring_buffer_take
 UNION ALL BY NAME
 SELECT
-    event_id AS start_event_id, event_id AS end_event_id, trace_index, thread_id, process_id,
+    event_id AS start_event_id,
+    event_id AS end_event_id,
+    trace_index, thread_id, process_id,
     ts_ns AS taken_ns,
     'agnocast' AS method,
-    handle AS rmw_handle, subscription_event_id,
+    handle AS rmw_handle,
+    subscription_event_id,
     subscription_event_id IS NOT NULL AS is_known
 FROM agnocast_take

@@ -16,8 +16,8 @@
 CREATE OR REPLACE TEMP TABLE callback_batch AS
 WITH begun AS (
     SELECT
-        b.start_event_id AS event_id, r.thread_id, b.subscription_event_id,
-        r.previous_executor_event_id
+        b.start_event_id AS event_id,
+        r.thread_id, b.subscription_event_id, r.previous_executor_event_id
     FROM staging.callback_binding AS b
     JOIN staging.callback_run AS r ON b.start_event_id = r.start_event_id
     -- Beside messages from a buffer, copies come that no callback is called with.
@@ -30,8 +30,10 @@ WITH begun AS (
 ),
 step AS (
     SELECT
-        t.start_event_id AS event_id, t.thread_id, t.subscription_event_id,
-        NULL::BIGINT AS previous_executor_event_id, true AS is_take
+        t.start_event_id AS event_id,
+        t.thread_id, t.subscription_event_id,
+        NULL::BIGINT AS previous_executor_event_id,
+        true AS is_take
     FROM staging.take_chain AS t
     SEMI JOIN begun AS b
         ON t.thread_id = b.thread_id AND t.subscription_event_id = b.subscription_event_id
@@ -41,7 +43,9 @@ step AS (
     SELECT event_id, thread_id, subscription_event_id, previous_executor_event_id, false FROM begun
 ),
 unbroken AS (
-    SELECT s.*, coalesce(k.resumed_event_id, 0) AS since_event_id
+    SELECT
+        s.*,
+        coalesce(k.resumed_event_id, 0) AS since_event_id
     FROM step AS s
     ASOF LEFT JOIN staging.thread_break AS k
         ON s.thread_id = k.thread_id AND s.event_id >= k.resumed_event_id
@@ -73,7 +77,9 @@ numbered AS (
         END AS number
     FROM counted
 )
-SELECT c.event_id AS start_event_id, t.event_id AS take_event_id
+SELECT
+    c.event_id AS start_event_id,
+    t.event_id AS take_event_id
 FROM numbered AS c
 JOIN numbered AS t
     ON c.thread_id = t.thread_id
@@ -119,7 +125,9 @@ reader AS (
     GROUP BY process_id, buffer_handle
 ),
 buffer AS (
-    SELECT process_id, buffer_handle, min(start_event_id) AS event_id
+    SELECT
+        process_id, buffer_handle,
+        min(start_event_id) AS event_id
     FROM dequeue
     GROUP BY process_id, buffer_handle
 )
@@ -159,7 +167,9 @@ dequeue AS (
     WHERE t.method = 'ring_buffer' AND NOT t.is_known AND o.subscription_event_id IS NOT NULL
 ),
 callback AS (
-    SELECT callback_event_id, min(start_event_id) AS event_id
+    SELECT
+        callback_event_id,
+        min(start_event_id) AS event_id
     FROM handed_over
     GROUP BY callback_event_id
 ),

@@ -36,7 +36,9 @@ origin AS (
         ON r.process_id = m.process_id AND r.number = m.number AND r.start_event_id > m.event_id
 ),
 inside AS (
-    SELECT o.start_event_id, b.start_event_id AS call_event_id
+    SELECT
+        o.start_event_id,
+        b.start_event_id AS call_event_id
     FROM origin AS o
     ASOF JOIN begun AS b ON o.thread_id = b.thread_id AND o.event_id > b.start_event_id
     WHERE coalesce(b.end_event_id > o.event_id, true)
@@ -54,7 +56,8 @@ behind AS (
     WHERE coalesce(t.event_id > o.turn_event_id, true)
 )
 SELECT
-    start_event_id, call_event_id, NULL::BIGINT AS response_event_id,
+    start_event_id, call_event_id,
+    NULL::BIGINT AS response_event_id,
     NULL::BIGINT AS request_event_id
 FROM inside
 UNION ALL
@@ -71,17 +74,30 @@ WINDOW same AS (PARTITION BY event_id);
 
 WITH begun AS NOT MATERIALIZED (
     SELECT
-        start_event_id AS event_id, process_id, callback_handle AS handle, is_intra_process,
-        previous_event_id, previous_executor_event_id
+        start_event_id AS event_id,
+        process_id,
+        callback_handle AS handle,
+        is_intra_process, previous_event_id, previous_executor_event_id
     FROM staging.callback_run
 ),
-known AS (SELECT event_id, process_id, callback_handle AS handle FROM staging.callback_known),
+known AS (
+    SELECT
+        event_id, process_id,
+        callback_handle AS handle
+    FROM staging.callback_known
+),
 first_run AS (
-    SELECT process_id, handle, min(event_id) AS event_id FROM begun GROUP BY process_id, handle
+    SELECT
+        process_id, handle,
+        min(event_id) AS event_id
+    FROM begun
+    GROUP BY process_id, handle
 ),
 run AS (
     SELECT
-        b.event_id AS start_event_id, b.process_id, b.handle AS callback_handle,
+        b.event_id AS start_event_id,
+        b.process_id,
+        b.handle AS callback_handle,
         b.is_intra_process,
         coalesce(b.object_event_id, f.event_id) AS callback_event_id,
         coalesce(k.kind, 'unknown') AS kind,
@@ -99,7 +115,8 @@ run AS (
 )
 SELECT
     r.start_event_id, r.process_id, r.callback_handle, r.is_intra_process, r.callback_event_id,
-    r.kind, t.start_event_id AS take_event_id,
+    r.kind,
+    t.start_event_id AS take_event_id,
     coalesce(r.subscription_event_id, t.subscription_event_id) AS subscription_event_id,
     coalesce(q.event_id, p.request_event_id) AS request_event_id,
     p.call_event_id, p.response_event_id

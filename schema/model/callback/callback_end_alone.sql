@@ -8,10 +8,14 @@ WITH alone AS (
     ANTI JOIN staging.callback_run AS r ON e.event_id = r.end_event_id
 ),
 paired AS (
-    SELECT thread_id, unnest([start_event_id, end_event_id]) AS event_id
+    SELECT
+        thread_id,
+        unnest([start_event_id, end_event_id]) AS event_id
     FROM staging.callback_run
     WHERE thread_id IN (SELECT thread_id FROM alone)
 )
-SELECT a.event_id, a.trace_index, p.event_id AS previous_event_id
+SELECT
+    a.event_id, a.trace_index,
+    p.event_id AS previous_event_id
 FROM alone AS a
 ASOF LEFT JOIN paired AS p ON a.thread_id = p.thread_id AND a.event_id > p.event_id

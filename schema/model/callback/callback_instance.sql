@@ -7,14 +7,17 @@ SELECT
     r.trace_index + 1 AS trace_id,
     n.callback_id, r.process_id, r.thread_id, r.start_ns,
     coalesce(r.end_ns, d.end_ns) AS end_ns,
-    n.take_id, q.request_id, s.response_id, s.callback_instance_id AS continues_id,
+    n.take_id, q.request_id, s.response_id,
+    s.callback_instance_id AS continues_id,
     r.is_intra_process, p.parent_id, r.depth, r.start_event_id, r.end_event_id,
     r.effective_end_event_id,
     g.start_event_id IS NOT NULL AS is_loss_affected
 FROM staging.callback_run AS r
 JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
 LEFT JOIN (
-    SELECT i.start_event_id, o.callback_instance_id AS parent_id
+    SELECT
+        i.start_event_id,
+        o.callback_instance_id AS parent_id
     FROM staging.callback_run AS i
     JOIN staging.callback_number AS o ON i.parent_event_id = o.start_event_id
 ) AS p ON r.start_event_id = p.start_event_id

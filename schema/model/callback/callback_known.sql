@@ -25,20 +25,25 @@ machine AS (
 -- A service of rclcpp has its callback before the thread initialises the next.
 added AS (
     SELECT
-        a.event_id, a.thread_id, i.event_id AS init_event_id,
+        a.event_id, a.thread_id,
+        i.event_id AS init_event_id,
         a.service_handle = i.service_handle AS is_own
     FROM staging.located('raw.ros2_rclcpp_service_callback_added') AS a
     ASOF JOIN initialised AS i ON a.thread_id = i.thread_id AND a.event_id >= i.event_id
 ),
 service AS (
-    SELECT m.event_id AS machine_event_id, i.event_id
+    SELECT
+        m.event_id AS machine_event_id,
+        i.event_id
     FROM initialised AS i
     ANTI JOIN (FROM added WHERE is_own) AS a ON i.event_id = a.init_event_id
     ASOF JOIN machine AS m
         ON i.thread_id = m.thread_id AND i.node_handle = m.node_handle AND i.event_id <= m.event_id
 ),
 callback AS (
-    SELECT m.event_id AS machine_event_id, a.event_id
+    SELECT
+        m.event_id AS machine_event_id,
+        a.event_id
     FROM added AS a
     ASOF JOIN machine AS m ON a.thread_id = m.thread_id AND a.event_id >= m.event_id
     WHERE a.init_event_id < m.event_id
@@ -49,12 +54,18 @@ numbered AS (
         row_number() OVER (PARTITION BY machine_event_id, kind ORDER BY event_id) AS position,
         count(*) OVER (PARTITION BY machine_event_id, kind) AS number
     FROM (
-        SELECT machine_event_id, event_id, 'service' AS kind FROM service
+        SELECT
+            machine_event_id, event_id,
+            'service' AS kind
+        FROM service
         UNION ALL
-        SELECT machine_event_id, event_id, 'callback' FROM callback
+        SELECT machine_event_id, event_id, 'callback'
+        FROM callback
     )
 )
-SELECT c.event_id, s.event_id AS service_event_id
+SELECT
+    c.event_id,
+    s.event_id AS service_event_id
 FROM numbered AS c
 JOIN numbered AS s
     ON c.machine_event_id = s.machine_event_id AND c.position = s.position AND c.number = s.number
@@ -65,9 +76,12 @@ WHERE c.kind = 'callback'
 
 WITH added AS (
     SELECT
-        a.event_id, a.ts_ns, a.process_id, a.callback, 'subscription' AS kind,
-        o.subscription_event_id, NULL::BIGINT AS timer_event_id,
-        NULL::BIGINT AS service_event_id, NULL::UBIGINT AS service_handle
+        a.event_id, a.ts_ns, a.process_id, a.callback,
+        'subscription' AS kind,
+        o.subscription_event_id,
+        NULL::BIGINT AS timer_event_id,
+        NULL::BIGINT AS service_event_id,
+        NULL::UBIGINT AS service_handle
     FROM staging.located('raw.ros2_rclcpp_subscription_callback_added') AS a
     LEFT JOIN staging.subscription_object AS o ON a.event_id = o.event_id
     UNION ALL
@@ -78,7 +92,8 @@ WITH added AS (
     UNION ALL
     SELECT
         a.event_id, a.ts_ns, a.process_id, a.callback, 'service', NULL, NULL,
-        coalesce(l.service_event_id, s.event_id), a.service_handle
+        coalesce(l.service_event_id, s.event_id),
+        a.service_handle
     FROM staging.located('raw.ros2_rclcpp_service_callback_added') AS a
     LEFT JOIN lifecycle_service AS l ON a.event_id = l.event_id
     ASOF LEFT JOIN staging.located('raw.ros2_rcl_service_init') AS s
@@ -101,14 +116,20 @@ registered AS (
     WHERE r.symbol NOT LIKE '#msgflow %' OR r.symbol LIKE '#msgflow function %'
 ),
 symbol_of AS (
-    SELECT added_event_id, arg_min(symbol, event_id) AS symbol
+    SELECT
+        added_event_id,
+        arg_min(symbol, event_id) AS symbol
     FROM registered
     WHERE added_event_id IS NOT NULL
     GROUP BY added_event_id
 )
 SELECT
-    a.event_id, a.ts_ns AS created_ns, a.process_id, a.callback AS callback_handle, a.kind,
-    a.subscription_event_id, a.timer_event_id, a.service_event_id, a.service_handle, s.symbol
+    a.event_id,
+    a.ts_ns AS created_ns,
+    a.process_id,
+    a.callback AS callback_handle,
+    a.kind, a.subscription_event_id, a.timer_event_id, a.service_event_id, a.service_handle,
+    s.symbol
 FROM added AS a
 LEFT JOIN symbol_of AS s ON a.event_id = s.added_event_id
 UNION ALL

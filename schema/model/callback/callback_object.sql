@@ -5,9 +5,14 @@
 WITH every_callback AS (
     FROM staging.callback_known
     UNION ALL BY NAME
-    SELECT DISTINCT callback_event_id AS event_id, process_id, kind, callback_handle
+    SELECT DISTINCT
+        callback_event_id AS event_id,
+        process_id, kind, callback_handle
     FROM staging.callback_binding
     WHERE kind = 'unknown'
         AND callback_event_id NOT IN (SELECT event_id FROM staging.callback_known)
 )
-SELECT row_number() OVER (ORDER BY event_id) AS callback_id, * FROM every_callback
+SELECT
+    row_number() OVER (ORDER BY event_id) AS callback_id,
+    *
+FROM every_callback

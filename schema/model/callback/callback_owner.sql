@@ -35,9 +35,13 @@ run AS (
     WHERE p.executor_event_id IS NOT NULL
 ),
 announced AS (
-    SELECT event_id, handle, false AS is_ready FROM raw.ros2_rclcpp_executor_execute
+    SELECT
+        event_id, handle,
+        false AS is_ready
+    FROM raw.ros2_rclcpp_executor_execute
     UNION ALL
-    SELECT event_id, NULL, true FROM raw.ros2_rclcpp_executor_get_next_ready
+    SELECT event_id, NULL, true
+    FROM raw.ros2_rclcpp_executor_get_next_ready
 )
 SELECT
     r.start_event_id, r.process_id, r.callback_event_id, r.trace_index, r.thread_id, a.handle,
@@ -73,13 +77,20 @@ agreed AS (
         OR (count(t.handle) = count(*) AND count(DISTINCT t.handle) = 1)
 ),
 owner AS (
-    SELECT event_id, process_id, timer_handle AS handle, 'timer' AS kind, event_id AS owner_event_id
+    SELECT
+        event_id, process_id,
+        timer_handle AS handle,
+        'timer' AS kind,
+        event_id AS owner_event_id
     FROM staging.located('raw.ros2_rcl_timer_init')
     UNION ALL
     SELECT event_id, process_id, subscription_handle, 'subscription', event_id
     FROM staging.subscription_known
     UNION ALL
-    SELECT 0, process_id, any_value(timer_handle), 'timer', timer_event_id
+    SELECT
+        0, process_id,
+        any_value(timer_handle),
+        'timer', timer_event_id
     FROM staging.timer_use
     WHERE is_inferred
     GROUP BY process_id, timer_event_id
@@ -134,7 +145,9 @@ served AS (
         AND thread_id NOT IN (SELECT thread_id FROM run WHERE has_several_threads)
 ),
 behind AS (
-    SELECT c.start_event_id, c.process_id, c.thread_id, s.start_event_id AS served_event_id
+    SELECT
+        c.start_event_id, c.process_id, c.thread_id,
+        s.start_event_id AS served_event_id
     FROM candidate AS c
     ASOF JOIN served AS s ON c.thread_id = s.thread_id AND c.start_event_id > s.start_event_id
 ),
@@ -182,7 +195,9 @@ asked AS (
     WHERE request_event_id IS NOT NULL
 ),
 service AS (
-    SELECT process_id, service_handle, min(event_id) AS event_id
+    SELECT
+        process_id, service_handle,
+        min(event_id) AS event_id
     FROM staging.callback_known
     WHERE kind = 'service' AND service_event_id IS NULL
     GROUP BY process_id, service_handle

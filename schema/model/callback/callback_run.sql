@@ -34,8 +34,12 @@ ASOF JOIN gap AS g ON e.thread_id = g.thread_id AND e.event_id >= g.event_id;
 
 CREATE OR REPLACE TEMP TABLE callback_plain AS
 SELECT
-    s.event_id AS start_event_id, e.event_id AS end_event_id, s.ts_ns AS start_ns,
-    e.ts_ns AS end_ns, s.trace_index, c.thread_id, c.process_id, s.callback AS callback_handle,
+    s.event_id AS start_event_id,
+    e.event_id AS end_event_id,
+    s.ts_ns AS start_ns,
+    e.ts_ns AS end_ns,
+    s.trace_index, c.thread_id, c.process_id,
+    s.callback AS callback_handle,
     coalesce(s.is_intra_process = 1, false) AS is_intra_process,
     CASE WHEN g.event_id IS NULL THEN s.previous_call_event_id END AS previous_event_id,
     s.previous_callback_event_id, s.previous_executor_event_id,
@@ -59,8 +63,10 @@ WHERE m.segment IS NOT DISTINCT FROM n.segment;
 CREATE OR REPLACE TEMP TABLE callback_left_over AS
 WITH RECURSIVE event AS (
     SELECT
-        s.event_id, s.ts_ns, s.trace_index, s.thread_index, s.callback AS callback_handle,
-        true AS is_start, coalesce(s.is_intra_process = 1, false) AS is_intra_process,
+        s.event_id, s.ts_ns, s.trace_index, s.thread_index,
+        s.callback AS callback_handle,
+        true AS is_start,
+        coalesce(s.is_intra_process = 1, false) AS is_intra_process,
         s.previous_call_event_id, s.previous_callback_event_id, s.previous_executor_event_id
     FROM raw.ros2_callback_start AS s
     ANTI JOIN callback_plain AS p ON s.event_id = p.start_event_id
@@ -89,7 +95,8 @@ callback_event AS MATERIALIZED (
 left_over AS (
     SELECT
         0 AS pass, event_id, thread_id, callback_handle, segment, is_start, ts_ns,
-        NULL::BIGINT AS partner_event_id, NULL::BIGINT AS partner_ns
+        NULL::BIGINT AS partner_event_id,
+        NULL::BIGINT AS partner_ns
     FROM callback_event
     UNION ALL
     SELECT
@@ -97,7 +104,8 @@ left_over AS (
         partner_ns
     FROM (
         SELECT
-            pass + 1 AS pass, event_id, thread_id, callback_handle, segment, is_start, ts_ns,
+            pass + 1 AS pass,
+            event_id, thread_id, callback_handle, segment, is_start, ts_ns,
             CASE
                 WHEN is_start AND NOT lead(is_start) OVER same THEN lead(event_id) OVER same
                 WHEN NOT is_start AND lag(is_start) OVER same THEN lag(event_id) OVER same
@@ -111,7 +119,10 @@ left_over AS (
     QUALIFY bool_or(partner_event_id IS NOT NULL) OVER ()
 ),
 paired AS (
-    SELECT event_id, max(partner_event_id) AS partner_event_id, max(partner_ns) AS partner_ns
+    SELECT
+        event_id,
+        max(partner_event_id) AS partner_event_id,
+        max(partner_ns) AS partner_ns
     FROM left_over
     GROUP BY event_id
 )
@@ -128,12 +139,16 @@ JOIN paired AS p ON e.event_id = p.event_id;
 --     BIGINT
 CREATE OR REPLACE TEMP TABLE callback_nesting AS
 WITH never_ended AS MATERIALIZED (
-    SELECT event_id AS start_event_id, thread_id, previous_executor_event_id
+    SELECT
+        event_id AS start_event_id,
+        thread_id, previous_executor_event_id
     FROM callback_left_over
     WHERE is_start AND partner_event_id IS NULL
 ),
 closed_by AS (
-    SELECT o.start_event_id, min(e.event_id) AS event_id
+    SELECT
+        o.start_event_id,
+        min(e.event_id) AS event_id
     FROM never_ended AS o
     JOIN (
         SELECT event_id, thread_id, previous_callback_event_id FROM callback_left_over
@@ -143,7 +158,9 @@ closed_by AS (
         ON o.start_event_id = e.previous_callback_event_id AND o.thread_id = e.thread_id
     GROUP BY o.start_event_id
     UNION ALL
-    SELECT o.start_event_id, min(x.event_id)
+    SELECT
+        o.start_event_id,
+        min(x.event_id)
     FROM never_ended AS o
     JOIN staging.executor_event AS x
         ON o.previous_executor_event_id = x.previous_event_id
@@ -161,11 +178,16 @@ closed_by AS (
         ON o.thread_id = g.thread_id AND o.start_event_id < g.event_id
 ),
 effective_end AS (
-    SELECT start_event_id, min(event_id) AS event_id FROM closed_by GROUP BY start_event_id
+    SELECT
+        start_event_id,
+        min(event_id) AS event_id
+    FROM closed_by
+    GROUP BY start_event_id
 ),
 outer_run AS MATERIALIZED (
     SELECT
-        p.event_id AS start_event_id, p.thread_id,
+        p.event_id AS start_event_id,
+        p.thread_id,
         coalesce(p.partner_event_id, e.event_id, t.last_event_id + 1) AS effective_end_event_id
     FROM callback_left_over AS p
     JOIN staging.thread AS t ON p.thread_id = t.thread_id
@@ -173,9 +195,14 @@ outer_run AS MATERIALIZED (
     WHERE p.is_start
 ),
 edge AS (
-    SELECT thread_id, start_event_id AS event_id, 1 AS step FROM outer_run
+    SELECT
+        thread_id,
+        start_event_id AS event_id,
+        1 AS step
+    FROM outer_run
     UNION ALL
-    SELECT thread_id, effective_end_event_id, -1 FROM outer_run
+    SELECT thread_id, effective_end_event_id, -1
+    FROM outer_run
 ),
 level AS (
     SELECT
@@ -185,7 +212,10 @@ level AS (
     GROUP BY thread_id, event_id
 ),
 started AS (
-    SELECT start_event_id, thread_id, false AS is_plain FROM outer_run
+    SELECT
+        start_event_id, thread_id,
+        false AS is_plain
+    FROM outer_run
     UNION ALL
     SELECT start_event_id, thread_id, true
     FROM callback_plain
@@ -207,13 +237,18 @@ ASOF LEFT JOIN (SELECT * FROM nested WHERE NOT is_plain) AS o
     ON i.thread_id = o.thread_id AND i.depth - 1 = o.depth AND i.start_event_id > o.start_event_id;
 
 WITH pair AS (
-    SELECT *, true AS is_plain FROM callback_plain
+    SELECT
+        *,
+        true AS is_plain
+    FROM callback_plain
     UNION ALL BY NAME
     SELECT
-        event_id AS start_event_id, partner_event_id AS end_event_id, ts_ns AS start_ns,
-        partner_ns AS end_ns, trace_index, thread_id, process_id, callback_handle,
-        is_intra_process, previous_event_id, previous_callback_event_id,
-        previous_executor_event_id, executor_event_id,
+        event_id AS start_event_id,
+        partner_event_id AS end_event_id,
+        ts_ns AS start_ns,
+        partner_ns AS end_ns,
+        trace_index, thread_id, process_id, callback_handle, is_intra_process, previous_event_id,
+        previous_callback_event_id, previous_executor_event_id, executor_event_id,
         false AS is_plain
     FROM callback_left_over
     WHERE is_start

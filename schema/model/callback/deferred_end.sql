@@ -17,7 +17,9 @@ ended AS (
     WHERE b.callback_event_id IN (SELECT callback_event_id FROM closed)
         AND p.end_event_id IS NOT NULL
 )
-SELECT c.start_event_id, x.ts_ns AS end_ns
+SELECT
+    c.start_event_id,
+    x.ts_ns AS end_ns
 FROM closed AS c
 ANTI JOIN ended AS n ON c.callback_event_id = n.callback_event_id
 JOIN staging.executor_event AS x ON c.effective_end_event_id = x.event_id

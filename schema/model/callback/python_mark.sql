@@ -5,7 +5,8 @@
 -- grain: one row per such event
 -- when: raw.ros2_rclcpp_callback_register WHERE symbol LIKE '#msgflow %'
 SELECT
-    event_id, ts_ns, thread_id, process_id, callback AS number,
+    event_id, ts_ns, thread_id, process_id,
+    callback AS number,
     split_part(symbol, ' ', 2) AS kind,
     substr(symbol, 11 + length(split_part(symbol, ' ', 2))) AS text,
     previous_callback_event_id, previous_executor_event_id

@@ -3,7 +3,10 @@
 -- grain: one row per callback in a callback group
 -- when: staging.callback_group_owner
 WITH entry AS (
-    SELECT event_id, process_id, callback_group_addr, 'timer' AS kind, timer_handle AS handle
+    SELECT
+        event_id, process_id, callback_group_addr,
+        'timer' AS kind,
+        timer_handle AS handle
     FROM staging.located('raw.ros2_caret_callback_group_add_timer')
     UNION ALL
     SELECT event_id, process_id, callback_group_addr, 'subscription', subscription_handle
@@ -13,7 +16,11 @@ WITH entry AS (
     FROM staging.located('raw.ros2_caret_callback_group_add_service')
 ),
 object AS (
-    SELECT event_id, process_id, 'timer' AS kind, timer_handle AS handle, timer_id AS object_id
+    SELECT
+        event_id, process_id,
+        'timer' AS kind,
+        timer_handle AS handle,
+        timer_id AS object_id
     FROM staging.timer
     UNION ALL
     SELECT event_id, process_id, 'subscription', subscription_handle, subscription_id
@@ -49,7 +56,9 @@ owned AS (
     GROUP BY e.event_id
 ),
 entered AS (
-    SELECT c.callback_id, min(w.group_event_id) AS group_event_id
+    SELECT
+        c.callback_id,
+        min(w.group_event_id) AS group_event_id
     FROM filled AS f
     JOIN owned AS w ON f.event_id = w.event_id
     JOIN object AS o ON f.kind = o.kind AND f.object_event_id = o.event_id

@@ -11,7 +11,9 @@
 -- columns: thread_id BIGINT, first_event_id BIGINT
 CREATE OR REPLACE TEMP TABLE executor_alternating AS
 WITH several AS (
-    SELECT process_id, min(event_id) AS first_event_id
+    SELECT
+        process_id,
+        min(event_id) AS first_event_id
     FROM staging.executor_first
     GROUP BY process_id
     HAVING count(*) > 1
@@ -37,21 +39,25 @@ WHERE s.process_id IN (
     HAVING max(waiting) = 1 AND count(*) FILTER (WHERE is_other) >= 10
 );
 
--- Threads of the executors that are named. If a thread serves several of them, it belongs to the one
--- whose callbacks it ran most.
--- when: staging.callback_group_member, staging.python_mark WHERE kind = 'executor'
--- columns: thread_id BIGINT, executor_event_id BIGINT
+-- Threads of the executors that are named. If a thread serves several of them, it belongs to the
+-- one whose callbacks it ran most. when: staging.callback_group_member, staging.python_mark WHERE
+-- kind = 'executor' columns: thread_id BIGINT, executor_event_id BIGINT
 CREATE OR REPLACE TEMP TABLE thread_executor AS
 SELECT thread_id, executor_event_id
 FROM (
-    SELECT r.thread_id, s.executor_event_id, count(*) AS run_count
+    SELECT
+        r.thread_id, s.executor_event_id,
+        count(*) AS run_count
     FROM staging.callback_run AS r
     JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
     JOIN staging.callback_group_member AS s ON n.callback_id = s.callback_id
     WHERE r.depth = 1 AND s.executor_event_id IS NOT NULL
     GROUP BY r.thread_id, s.executor_event_id
     UNION ALL
-    SELECT m.thread_id, min(x.event_id), 0
+    SELECT
+        m.thread_id,
+        min(x.event_id),
+        0
     FROM staging.python_mark AS m
     JOIN staging.executor_named AS x
         ON m.process_id = x.process_id AND m.number = x.executor_addr
@@ -69,7 +75,10 @@ CREATE OR REPLACE TEMP TABLE executor_member AS
 WITH RECURSIVE
 -- What ties threads: an executor by its event, or a callback by its (never negative) identity.
 runs AS (
-    SELECT thread_id, -1 - executor_event_id AS tie_id FROM thread_executor
+    SELECT
+        thread_id,
+        -1 - executor_event_id AS tie_id
+    FROM thread_executor
     UNION ALL
     SELECT DISTINCT r.thread_id, n.callback_id
     FROM staging.callback_run AS r
@@ -77,11 +86,16 @@ runs AS (
     ANTI JOIN staging.callback_group_member AS s
         ON n.callback_id = s.callback_id AND s.executor_event_id IS NOT NULL
     UNION ALL
-    SELECT thread_id, -1 - first_event_id FROM executor_alternating
+    SELECT
+        thread_id,
+        -1 - first_event_id
+    FROM executor_alternating
 ),
 -- Each thread is tied to the smallest one that shares something with it, not to all.
 neighbour AS (
-    SELECT DISTINCT thread_id, min(thread_id) OVER (PARTITION BY tie_id) AS other_thread_id
+    SELECT DISTINCT
+        thread_id,
+        min(thread_id) OVER (PARTITION BY tie_id) AS other_thread_id
     FROM runs
 ),
 tie AS (
@@ -98,7 +112,9 @@ member AS (
 labelled (thread_id, first_thread_id) USING KEY (thread_id) AS (
     SELECT thread_id, thread_id FROM member
     UNION
-    SELECT t.other_thread_id, min(l.first_thread_id)
+    SELECT
+        t.other_thread_id,
+        min(l.first_thread_id)
     FROM labelled AS l
     JOIN tie AS t ON l.thread_id = t.thread_id
     JOIN recurring.labelled AS k ON t.other_thread_id = k.thread_id
@@ -140,7 +156,10 @@ every_executor AS (
     FROM deduced AS d
     LEFT JOIN staging.executor_named AS x ON d.executor_event_id = x.event_id
     UNION ALL
-    SELECT NULL, x.process_id, [], x.event_id, x.kind, false
+    SELECT
+        NULL, x.process_id,
+        [],
+        x.event_id, x.kind, false
     FROM staging.executor_named AS x
     ANTI JOIN deduced AS d ON x.event_id = d.executor_event_id
 )

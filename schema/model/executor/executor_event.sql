@@ -3,11 +3,20 @@
 --     These are most of the events of many traces, which is why they are not copied.
 -- grain: one row per executor event
 WITH event AS (
-    SELECT *, 'process' AS kind FROM raw.ros2_rclcpp_executor_get_next_ready
+    SELECT
+        *,
+        'process' AS kind
+    FROM raw.ros2_rclcpp_executor_get_next_ready
     UNION ALL BY NAME
-    SELECT *, 'wait' AS kind FROM raw.ros2_rclcpp_executor_wait_for_work
+    SELECT
+        *,
+        'wait' AS kind
+    FROM raw.ros2_rclcpp_executor_wait_for_work
     UNION ALL BY NAME
-    SELECT *, 'execute' AS kind FROM raw.ros2_rclcpp_executor_execute
+    SELECT
+        *,
+        'execute' AS kind
+    FROM raw.ros2_rclcpp_executor_execute
 )
 SELECT
     event_id, ts_ns, process_id, thread_id, kind, timeout,

@@ -5,7 +5,9 @@
 --     raw.ros2_caret_add_callback_group, raw.ros2_caret_executor_entity_collector_to_executor,
 --     staging.python_mark WHERE kind = 'executor'
 WITH constructed AS (
-    SELECT event_id, process_id, executor_addr, executor_type_name AS kind
+    SELECT
+        event_id, process_id, executor_addr,
+        executor_type_name AS kind
     FROM staging.located('raw.ros2_caret_construct_executor')
     UNION ALL
     SELECT event_id, process_id, executor_addr, executor_type_name
@@ -18,14 +20,22 @@ used AS (
     SELECT event_id, process_id, executor_addr
     FROM staging.located('raw.ros2_caret_executor_entity_collector_to_executor')
 )
-SELECT event_id, process_id, executor_addr, coalesce(kind, 'unknown') AS kind FROM constructed
+SELECT
+    event_id, process_id, executor_addr,
+    coalesce(kind, 'unknown') AS kind
+FROM constructed
 UNION ALL
-SELECT min(u.event_id), u.process_id, u.executor_addr, 'unknown'
+SELECT
+    min(u.event_id),
+    u.process_id, u.executor_addr, 'unknown'
 FROM used AS u
 ANTI JOIN constructed AS c ON u.process_id = c.process_id AND u.executor_addr = c.executor_addr
 GROUP BY u.process_id, u.executor_addr
 UNION ALL
-SELECT min(event_id), process_id, number, arg_min(text, event_id)
+SELECT
+    min(event_id),
+    process_id, number,
+    arg_min(text, event_id)
 FROM staging.python_mark
 WHERE kind = 'executor'
 GROUP BY process_id, number

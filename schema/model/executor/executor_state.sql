@@ -3,7 +3,9 @@
 --     ended is not stored: derive.executor_interval reads it off the next one.
 -- grain: one row per executor event
 SELECT
-    e.thread_id, e.kind AS state, e.ts_ns AS start_ns,
+    e.thread_id,
+    e.kind AS state,
+    e.ts_ns AS start_ns,
     e.event_id IN (
         SELECT event_id FROM staging.near_gap WHERE sequence = 'executor' AND is_behind
     ) AS is_behind_gap,

@@ -17,12 +17,17 @@ WITH enabled AS (
     SELECT trace_index FROM staging.declared WHERE name = 'ros2:rclcpp_executor_get_next_ready'
 ),
 began AS (
-    SELECT thread_id, min(start_ns) AS start_ns FROM staging.callback_run GROUP BY thread_id
+    SELECT
+        thread_id,
+        min(start_ns) AS start_ns
+    FROM staging.callback_run
+    GROUP BY thread_id
 ),
 taken AS (
     SELECT
-        t.start_event_id, t.thread_id, t.process_id, t.taken_ns, t.source_timestamp_ns,
-        s.take_id, s.subscription_id, p.host_id, b.start_ns AS began_ns
+        t.start_event_id, t.thread_id, t.process_id, t.taken_ns, t.source_timestamp_ns, s.take_id,
+        s.subscription_id, p.host_id,
+        b.start_ns AS began_ns
     FROM staging.take_chain AS t
     JOIN staging.take_subscription AS s ON t.start_event_id = s.start_event_id
     JOIN staging.process AS p ON t.process_id = p.process_id
@@ -44,8 +49,10 @@ sent AS (
 )
 SELECT
     t.start_event_id, t.take_id, t.subscription_id, t.thread_id, t.process_id, t.taken_ns,
-    any_value(s.thread_id) AS publishing_thread_id, any_value(s.start_ns) AS published_ns,
-    any_value(s.end_ns) AS end_ns, any_value(s.next_ns) AS next_ns
+    any_value(s.thread_id) AS publishing_thread_id,
+    any_value(s.start_ns) AS published_ns,
+    any_value(s.end_ns) AS end_ns,
+    any_value(s.next_ns) AS next_ns
 FROM taken AS t
 JOIN sent AS s ON t.host_id = s.host_id AND t.source_timestamp_ns = s.source_timestamp_ns
 GROUP BY
@@ -78,7 +85,8 @@ pair AS (
 ),
 couple AS (
     SELECT
-        thread_id, count(*) FILTER (WHERE is_in_order) AS in_order,
+        thread_id,
+        count(*) FILTER (WHERE is_in_order) AS in_order,
         count(*) FILTER (WHERE NOT is_in_order) AS inverted,
         count(DISTINCT subscription_id) = 2 AS is_both_ways
     FROM pair
@@ -90,5 +98,7 @@ in_order AS (
     GROUP BY thread_id
     HAVING sum(in_order) >= 10 AND sum(inverted) = 0 AND bool_or(is_both_ways)
 )
-SELECT *, thread_id IN (FROM in_order) AS is_in_order
+SELECT
+    *,
+    thread_id IN (FROM in_order) AS is_in_order
 FROM queued

@@ -58,7 +58,9 @@ covered AS (
 -- the session recorded, and stopping would have written further ones.
 silent AS (
     SELECT
-        trace_id, recording_index, covered_until_ns AS start_ns, begin_ns AS end_ns,
+        trace_id, recording_index,
+        covered_until_ns AS start_ns,
+        begin_ns AS end_ns,
         -- Packets of one trace ended before they were full.
         coalesce(ended_early_ns = covered_until_ns, false)
         AND coalesce(previous_trace_id = trace_id, false) AS is_flushed
@@ -78,7 +80,8 @@ flush AS (
         row_number() OVER (PARTITION BY recording_index ORDER BY end_ns) AS number
     FROM (
         SELECT
-            *, lead(end_ns) OVER (PARTITION BY recording_index ORDER BY end_ns) - end_ns AS until_ns
+            *,
+            lead(end_ns) OVER (PARTITION BY recording_index ORDER BY end_ns) - end_ns AS until_ns
         FROM ending
     )
     WHERE coalesce(until_ns >= staging.pause_limit().least_ns, true)
@@ -127,7 +130,10 @@ silence AS (
 ),
 -- Silences within packets as well, from millisecond to millisecond.
 heard AS (
-    SELECT r.recording_index, min(e.ts_ns) AS first_ns, max(e.ts_ns) AS last_ns
+    SELECT
+        r.recording_index,
+        min(e.ts_ns) AS first_ns,
+        max(e.ts_ns) AS last_ns
     FROM staging.event AS e
     JOIN staging.placed_source AS r ON e.trace_index = r.trace_index
     WHERE r.recording_index IN (SELECT recording_index FROM silence WHERE NOT is_certain)
@@ -185,7 +191,9 @@ ANTI JOIN explained AS e ON s.recording_index = e.recording_index AND s.start_ns
 
 -- What kernel traces lost is missing from no process.
 WITH packet AS (
-    SELECT *, min(begin_ns) OVER (PARTITION BY recording_index) AS recording_begin_ns
+    SELECT
+        *,
+        min(begin_ns) OVER (PARTITION BY recording_index) AS recording_begin_ns
     FROM staging.packet
     WHERE domain IS DISTINCT FROM 'kernel'
 ),
@@ -200,10 +208,12 @@ lossy_packet AS (
 ),
 lost_event AS (
     SELECT
-        trace_id, cpu_id AS cpu,
+        trace_id,
+        cpu_id AS cpu,
         'loss' AS kind,
         coalesce(last_event_ns, begin_ns) AS start_ns,
-        known_end_ns AS end_ns, discarded_event_count AS event_count
+        known_end_ns AS end_ns,
+        discarded_event_count AS event_count
     FROM lossy_packet
     WHERE NOT (is_instant AND is_opened_late)
     UNION ALL
@@ -217,7 +227,8 @@ lost_event AS (
 ),
 lost_packet AS (
     SELECT
-        trace_id, cpu_id AS cpu,
+        trace_id,
+        cpu_id AS cpu,
         'packets' AS kind,
         least(coalesce(previous_end_ns, recording_begin_ns), begin_ns) AS start_ns,
         begin_ns AS end_ns,
@@ -246,7 +257,10 @@ recording_end AS (
 ),
 missing_end AS (
     SELECT
-        s.trace_id, s.cpu, 'packets' AS kind, s.end_ns AS start_ns, e.end_ns,
+        s.trace_id, s.cpu,
+        'packets' AS kind,
+        s.end_ns AS start_ns,
+        e.end_ns,
         NULL::BIGINT AS event_count
     FROM stream_end AS s
     JOIN recording_end AS e ON s.recording_index = e.recording_index

@@ -6,7 +6,9 @@
 -- grain: one row per such publication, take or callback instance
 -- when: staging.gap
 WITH last_gap AS (
-    SELECT recording_index, cpu_id, max(covered_until_ns) AS end_ns
+    SELECT
+        recording_index, cpu_id,
+        max(covered_until_ns) AS end_ns
     FROM staging.gap
     GROUP BY recording_index, cpu_id
 ),
@@ -14,7 +16,9 @@ WITH last_gap AS (
 -- thread is before a gap, where its CPU has one later. The first is behind one, where its CPU had
 -- one before, once its process was there.
 beside_gap AS MATERIALIZED (
-    SELECT event_id, thread_id, true AS is_behind
+    SELECT
+        event_id, thread_id,
+        true AS is_behind
     FROM staging.near_gap
     WHERE sequence = 'call' AND is_between
     UNION
@@ -47,8 +51,12 @@ beside_gap AS MATERIALIZED (
 -- `before_until` be before one.
 extent AS (
     SELECT
-        'publication' AS kind, start_event_id, thread_id, start_event_id AS behind_until,
-        end_event_id AS before_from, end_event_id AS before_until, end_event_id AS inside_until
+        'publication' AS kind,
+        start_event_id, thread_id,
+        start_event_id AS behind_until,
+        end_event_id AS before_from,
+        end_event_id AS before_until,
+        end_event_id AS inside_until
     FROM staging.publication_call
     UNION ALL
     SELECT
@@ -65,7 +73,8 @@ extent AS (
     UNION ALL
     SELECT
         'callback', start_event_id, thread_id, effective_end_event_id, start_event_id,
-        CASE WHEN end_event_id IS NULL THEN effective_end_event_id - 1 END, effective_end_event_id
+        CASE WHEN end_event_id IS NULL THEN effective_end_event_id - 1 END,
+        effective_end_event_id
     FROM staging.callback_run
 ),
 elsewhere AS (

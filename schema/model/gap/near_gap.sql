@@ -15,14 +15,16 @@ WITH exposed_trace AS (
 exposed AS (
     SELECT
         e.event_id, e.thread_index, e.trace_index, e.sequence, e.ts_ns, e.cpu_id,
-        p.ts_ns AS previous_ns, p.cpu_id AS previous_cpu_id
+        p.ts_ns AS previous_ns,
+        p.cpu_id AS previous_cpu_id
     FROM staging.predecessor AS e
     JOIN staging.event AS p ON e.previous_event_id = p.event_id
     WHERE e.trace_index IN (SELECT trace_index FROM exposed_trace)
     UNION ALL
     SELECT
         event_id, thread_index, trace_index, 'thread', ts_ns, cpu_id,
-        lag(ts_ns) OVER on_thread, lag(cpu_id) OVER on_thread
+        lag(ts_ns) OVER on_thread,
+        lag(cpu_id) OVER on_thread
     FROM staging.event
     WHERE trace_index IN (SELECT trace_index FROM exposed_trace)
     WINDOW on_thread AS (PARTITION BY thread_index ORDER BY event_id)
@@ -48,7 +50,8 @@ candidate AS (
     SELECT x.*
     FROM (
         SELECT
-            e.*, t.recording_index, e.ts_ns // s.length_ns AS number,
+            e.*, t.recording_index,
+            e.ts_ns // s.length_ns AS number,
             e.previous_ns // s.length_ns AS previous_number
         FROM exposed AS e
         JOIN exposed_trace AS t ON e.trace_index = t.trace_index
@@ -80,7 +83,8 @@ between_the_two AS (
     WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns
 )
 SELECT
-    n.event_id, n.thread_id, n.sequence, n.ts_ns, b.event_id IS NOT NULL AS is_between,
+    n.event_id, n.thread_id, n.sequence, n.ts_ns,
+    b.event_id IS NOT NULL AS is_between,
     b.event_id IS NOT NULL OR n.sequence = 'executor' AS is_behind
 FROM staging.located('near') AS n
 LEFT JOIN between_the_two AS b ON n.event_id = b.event_id AND n.sequence = b.sequence

@@ -4,7 +4,9 @@
 -- grain: one row per event with a gap between itself and the one before on its thread
 -- when: staging.near_gap
 SELECT
-    g.thread_id, g.event_id AS resumed_event_id, g.ts_ns AS resumed_ns,
+    g.thread_id,
+    g.event_id AS resumed_event_id,
+    g.ts_ns AS resumed_ns,
     NOT g.is_between AS is_elsewhere
 FROM staging.near_gap AS g
 JOIN staging.thread AS t ON g.thread_id = t.thread_id AND g.event_id > t.first_event_id

@@ -14,12 +14,18 @@ WITH every_node AS (
         false AS is_inferred
     FROM staging.located('raw.ros2_rcl_node_init')
     UNION ALL BY NAME
-    SELECT DISTINCT node_event_id AS event_id, process_id, node_handle, true AS is_inferred
+    SELECT DISTINCT
+        node_event_id AS event_id,
+        process_id, node_handle,
+        true AS is_inferred
     FROM staging.object_node
     WHERE is_inferred
 ),
 lived AS (
-    SELECT process_id, host_id, vpid, min(first_seen_ns) AS first_ns, max(last_seen_ns) AS last_ns
+    SELECT
+        process_id, host_id, vpid,
+        min(first_seen_ns) AS first_ns,
+        max(last_seen_ns) AS last_ns
     FROM staging.thread
     GROUP BY process_id, host_id, vpid
 ),

@@ -9,18 +9,26 @@
 --     raw.ros2_rcl_service_init, raw.ros2_rcl_client_init, raw.ros2_rclcpp_timer_link_node,
 --     raw.ros2_rcl_lifecycle_state_machine_init
 WITH initialisation AS (
-    SELECT event_id, thread_index, 'node' AS kind, node_handle FROM raw.ros2_rcl_node_init
+    SELECT
+        event_id, thread_index,
+        'node' AS kind,
+        node_handle
+    FROM raw.ros2_rcl_node_init
     UNION ALL
-    SELECT event_id, thread_index, 'publisher', node_handle FROM raw.ros2_rcl_publisher_init
+    SELECT event_id, thread_index, 'publisher', node_handle
+    FROM raw.ros2_rcl_publisher_init
     UNION ALL
     SELECT event_id, thread_index, 'subscription', node_handle
     FROM raw.ros2_rcl_subscription_init
     UNION ALL
-    SELECT event_id, thread_index, 'service', node_handle FROM raw.ros2_rcl_service_init
+    SELECT event_id, thread_index, 'service', node_handle
+    FROM raw.ros2_rcl_service_init
     UNION ALL
-    SELECT event_id, thread_index, 'client', node_handle FROM raw.ros2_rcl_client_init
+    SELECT event_id, thread_index, 'client', node_handle
+    FROM raw.ros2_rcl_client_init
     UNION ALL
-    SELECT event_id, thread_index, 'timer', node_handle FROM raw.ros2_rclcpp_timer_link_node
+    SELECT event_id, thread_index, 'timer', node_handle
+    FROM raw.ros2_rclcpp_timer_link_node
     UNION ALL
     SELECT event_id, thread_index, 'lifecycle', node_handle
     FROM raw.ros2_rcl_lifecycle_state_machine_init

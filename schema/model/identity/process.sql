@@ -18,21 +18,28 @@ FROM staging.thread;
 -- columns: process BIGINT, event_id BIGINT, handle UBIGINT, prefix UTINYINT[], gap_ns BIGINT
 CREATE OR REPLACE TEMP TABLE foreign_endpoint AS
 WITH made AS (
-    SELECT event_id, ts_ns, trace_index, thread_index, rmw_publisher_handle AS handle, gid
+    SELECT
+        event_id, ts_ns, trace_index, thread_index,
+        rmw_publisher_handle AS handle,
+        gid
     FROM raw.ros2_rmw_publisher_init
     UNION ALL
     SELECT event_id, ts_ns, trace_index, thread_index, rmw_subscription_handle, gid
     FROM raw.ros2_rmw_subscription_init
 ),
 identified AS (
-    SELECT t.process, m.event_id, m.ts_ns, m.trace_index, m.handle, m.gid[:8] AS prefix
+    SELECT
+        t.process, m.event_id, m.ts_ns, m.trace_index, m.handle,
+        m.gid[:8] AS prefix
     FROM made AS m
     JOIN id_thread AS t ON m.thread_index = t.thread_index
     WHERE m.gid[:2] = [1, 15]
     WINDOW process AS (PARTITION BY t.process)
     QUALIFY min(prefix) OVER process < max(prefix) OVER process
 )
-SELECT i.process, i.event_id, i.handle, i.prefix, min(g.start_ns) AS gap_ns
+SELECT
+    i.process, i.event_id, i.handle, i.prefix,
+    min(g.start_ns) AS gap_ns
 FROM identified AS i
 JOIN staging.placed_source AS r ON i.trace_index = r.trace_index
 LEFT JOIN staging.gap AS g ON r.recording_index = g.recording_index AND i.ts_ns < g.covered_until_ns
@@ -60,9 +67,13 @@ object AS (
         ON s.process = e.process AND p.rmw_publisher_handle = e.handle AND p.event_id >= e.event_id
 ),
 used AS (
-    SELECT event_id, ts_ns, thread_index, publisher_handle AS handle FROM raw.ros2_rcl_publish
+    SELECT
+        event_id, ts_ns, thread_index,
+        publisher_handle AS handle
+    FROM raw.ros2_rcl_publish
     UNION ALL
-    SELECT event_id, ts_ns, thread_index, rmw_subscription_handle FROM raw.ros2_rmw_take
+    SELECT event_id, ts_ns, thread_index, rmw_subscription_handle
+    FROM raw.ros2_rmw_take
 ),
 shown AS (
     SELECT process, prefix, event_id FROM foreign_endpoint
@@ -95,20 +106,26 @@ WITH process AS (
     GROUP BY ALL
 ),
 version AS (
-    SELECT process_id, arg_min(version, event_id) AS tracetools_version
+    SELECT
+        process_id,
+        arg_min(version, event_id) AS tracetools_version
     FROM staging.located('raw.ros2_rcl_init')
     GROUP BY process_id
 )
 SELECT
-    p.process_id, p.host_id, p.vpid AS pid, p.name, v.tracetools_version, y.python_version,
-    p.first_seen_ns, p.last_seen_ns, p.pid_ns AS pid_namespace,
+    p.process_id, p.host_id,
+    p.vpid AS pid,
+    p.name, v.tracetools_version, y.python_version, p.first_seen_ns, p.last_seen_ns,
+    p.pid_ns AS pid_namespace,
     p.life::INTEGER AS life,
     m.vpid IS NOT NULL AS is_ambiguous
 FROM process AS p
 LEFT JOIN version AS v ON p.process_id = v.process_id
 LEFT JOIN (
-    SELECT process_id, coalesce(any_value(text) FILTER (WHERE kind = 'python'), '?')
-        AS python_version
+    SELECT
+        process_id,
+        coalesce(any_value(text) FILTER (WHERE kind = 'python'), '?')
+            AS python_version
     FROM staging.python_mark
     GROUP BY process_id
 ) AS y ON p.process_id = y.process_id

@@ -41,7 +41,9 @@ WITH every_initialisation AS (
 ),
 -- Most are the first event of their process. `gap_ns`: begin of the first gap behind it.
 initialisation AS (
-    SELECT i.*, coalesce(min(g.start_ns), 9223372036854775807) AS gap_ns
+    SELECT
+        i.*,
+        coalesce(min(g.start_ns), 9223372036854775807) AS gap_ns
     FROM every_initialisation AS i
     JOIN staging.placed_source AS r ON i.trace_index = r.trace_index
     LEFT JOIN staging.gap AS g
@@ -56,7 +58,9 @@ thread AS (SELECT DISTINCT thread_index, host_id, pid_ns, vpid, vtid FROM thread
 -- object: what logs to /rosout publishes on a handle that is never made.
 handled AS (
     SELECT
-        thread_index, event_id, ts_ns, publisher_handle AS handle, true AS is_made,
+        thread_index, event_id, ts_ns,
+        publisher_handle AS handle,
+        true AS is_made,
         true AS shows_object
     FROM raw.ros2_rcl_publisher_init
     UNION ALL

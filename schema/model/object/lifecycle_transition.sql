@@ -6,7 +6,11 @@ WITH machine AS (
     FROM staging.located('raw.ros2_rcl_lifecycle_state_machine_init') AS m
     JOIN staging.object_node AS n ON m.event_id = n.event_id
 )
-SELECT m.node_id, t.ts_ns AS at_ns, t.start_label AS start_state, t.goal_label AS goal_state
+SELECT
+    m.node_id,
+    t.ts_ns AS at_ns,
+    t.start_label AS start_state,
+    t.goal_label AS goal_state
 FROM staging.located('raw.ros2_rcl_lifecycle_transition') AS t
 ASOF LEFT JOIN machine AS m
     ON t.process_id = m.process_id

@@ -5,7 +5,9 @@
 -- grain: one row per rcl_publisher_init
 -- when: raw.ros2_rcl_publisher_init
 WITH rmw_init AS (
-    SELECT event_id, ts_ns, process_id, rmw_publisher_handle, staging.gid_bytes(gid) AS gid
+    SELECT
+        event_id, ts_ns, process_id, rmw_publisher_handle,
+        staging.gid_bytes(gid) AS gid
     FROM staging.located('raw.ros2_rmw_publisher_init')
 ),
 writer_init AS (
@@ -21,7 +23,8 @@ with_rmw AS (
         coalesce(p.rmw_publisher_handle = 0, false) AS is_agnocast,
         CASE WHEN p.rmw_publisher_handle IS DISTINCT FROM 0 THEN 'rt' || p.topic_name END
             AS dds_topic,
-        r.gid, r.ts_ns AS rmw_created_ns
+        r.gid,
+        r.ts_ns AS rmw_created_ns
     FROM staging.located('raw.ros2_rcl_publisher_init') AS p
     ASOF LEFT JOIN rmw_init AS r
         ON p.process_id = r.process_id

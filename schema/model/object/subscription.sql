@@ -3,7 +3,10 @@
 -- grain: one row per subscription
 -- when: staging.subscription_known, staging.take_number
 WITH every_subscription AS (
-    SELECT *, false AS is_inferred FROM staging.subscription_known
+    SELECT
+        *,
+        false AS is_inferred
+    FROM staging.subscription_known
     UNION ALL BY NAME
     SELECT
         coalesce(subscription_event_id, min(start_event_id)) AS event_id,
@@ -18,7 +21,9 @@ WITH every_subscription AS (
 SELECT
     row_number() OVER (ORDER BY s.event_id) AS subscription_id,
     s.process_id, n.node_id, s.topic_name, s.subscription_handle, s.rmw_handle, s.gid,
-    s.queue_depth, s.created_ns, s.is_internal, s.is_inferred, false AS is_topic_learned,
-    false AS is_topic_declared, s.is_agnocast, s.event_id
+    s.queue_depth, s.created_ns, s.is_internal, s.is_inferred,
+    false AS is_topic_learned,
+    false AS is_topic_declared,
+    s.is_agnocast, s.event_id
 FROM every_subscription AS s
 LEFT JOIN staging.object_node AS n ON s.event_id = n.event_id

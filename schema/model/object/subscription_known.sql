@@ -2,7 +2,9 @@
 -- grain: one row per rcl_subscription_init
 -- when: raw.ros2_rcl_subscription_init
 WITH rmw_init AS (
-    SELECT event_id, ts_ns, process_id, rmw_subscription_handle, staging.gid_bytes(gid) AS gid
+    SELECT
+        event_id, ts_ns, process_id, rmw_subscription_handle,
+        staging.gid_bytes(gid) AS gid
     FROM staging.located('raw.ros2_rmw_subscription_init')
 )
 SELECT

@@ -5,7 +5,10 @@
 -- grain: one row per event that names an rclcpp subscription object
 -- when: raw.ros2_rclcpp_subscription_callback_added, raw.ros2_rclcpp_ipb_to_subscription
 WITH construction AS (
-    SELECT event_id AS construction_event_id, thread_id FROM staging.subscription_known
+    SELECT
+        event_id AS construction_event_id,
+        thread_id
+    FROM staging.subscription_known
 ),
 initialised AS (
     SELECT
@@ -33,7 +36,9 @@ placed AS (
         ON u.thread_id = c.thread_id AND u.event_id >= c.construction_event_id
 ),
 same_construction AS (
-    SELECT p.event_id, min(i.subscription_event_id) AS subscription_event_id
+    SELECT
+        p.event_id,
+        min(i.subscription_event_id) AS subscription_event_id
     FROM placed AS p
     JOIN initialised AS i
         ON p.thread_id = i.thread_id

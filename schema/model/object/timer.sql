@@ -3,10 +3,17 @@
 -- grain: one row per timer
 -- when: raw.ros2_rcl_timer_init, staging.timer_use, staging.callback_owner
 WITH every_timer AS (
-    SELECT event_id, process_id, period AS period_ns, timer_handle, ts_ns AS created_ns
+    SELECT
+        event_id, process_id,
+        period AS period_ns,
+        timer_handle,
+        ts_ns AS created_ns
     FROM staging.located('raw.ros2_rcl_timer_init')
     UNION ALL BY NAME
-    SELECT timer_event_id AS event_id, process_id, any_value(timer_handle) AS timer_handle
+    SELECT
+        timer_event_id AS event_id,
+        process_id,
+        any_value(timer_handle) AS timer_handle
     FROM (
         SELECT timer_event_id, process_id, timer_handle FROM staging.timer_use WHERE is_inferred
         UNION ALL
@@ -17,7 +24,9 @@ WITH every_timer AS (
     GROUP BY timer_event_id, process_id
 ),
 linked AS (
-    SELECT u.timer_event_id, min(n.node_id) AS node_id
+    SELECT
+        u.timer_event_id,
+        min(n.node_id) AS node_id
     FROM staging.timer_use AS u
     JOIN staging.object_node AS n ON u.event_id = n.event_id
     GROUP BY u.timer_event_id

@@ -4,14 +4,18 @@
 --     of Agnocast attaches both
 -- when: raw.ros2_rclcpp_timer_callback_added, raw.ros2_rclcpp_timer_link_node
 WITH use AS (
-    SELECT event_id, process_id, timer_handle, true AS has_callback
+    SELECT
+        event_id, process_id, timer_handle,
+        true AS has_callback
     FROM staging.located('raw.ros2_rclcpp_timer_callback_added')
     UNION ALL
     SELECT event_id, process_id, timer_handle, false
     FROM staging.located('raw.ros2_rclcpp_timer_link_node')
 ),
 resolved AS (
-    SELECT u.event_id, u.process_id, u.timer_handle, u.has_callback, i.event_id AS known_event_id
+    SELECT
+        u.event_id, u.process_id, u.timer_handle, u.has_callback,
+        i.event_id AS known_event_id
     FROM use AS u
     ASOF LEFT JOIN staging.located('raw.ros2_rcl_timer_init') AS i
         ON u.process_id = i.process_id

@@ -7,7 +7,10 @@ WITH object AS (
     SELECT event_id, process_id, handle FROM query_table(objects) WHERE handle IS NOT NULL
 ),
 by_handle AS (
-    SELECT process_id, handle, min(event_id) AS first_event_id, count(*) > 1 AS is_repeated
+    SELECT
+        process_id, handle,
+        min(event_id) AS first_event_id,
+        count(*) > 1 AS is_repeated
     FROM object
     GROUP BY process_id, handle
 )

@@ -17,7 +17,9 @@ WITH parsed AS (
 ),
 -- The times of a kernel trace may count from elsewhere.
 clock AS (
-    SELECT hostname, clock_key, min(clock_origin_ns) AS origin_ns
+    SELECT
+        hostname, clock_key,
+        min(clock_origin_ns) AS origin_ns
     FROM staging.source
     WHERE domain IS DISTINCT FROM 'kernel'
     GROUP BY hostname, clock_key

@@ -6,5 +6,11 @@ SELECT
     f.stack_frame_id,
     len(s.calls)::INTEGER AS depth,
     s.calls
-FROM (SELECT calls, max(ran) AS ran FROM staging.stack_text GROUP BY calls) AS s
+FROM (
+    SELECT
+        calls,
+        max(ran) AS ran
+    FROM staging.stack_text
+    GROUP BY calls
+) AS s
 JOIN staging.stack_frame AS f ON s.calls[s.ran] = f.call

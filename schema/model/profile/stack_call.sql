@@ -2,7 +2,10 @@
 -- grain: one row per stack and call in it
 -- when: staging.stack
 WITH call AS (
-    SELECT stack_id, unnest(range(1, len(calls) + 1))::INTEGER AS position, unnest(calls) AS call
+    SELECT
+        stack_id,
+        unnest(range(1, len(calls) + 1))::INTEGER AS position,
+        unnest(calls) AS call
     FROM staging.stack
 )
 SELECT c.stack_id, c.position, f.stack_frame_id

@@ -6,8 +6,8 @@
 -- when: staging.stack_text
 WITH RECURSIVE sample AS MATERIALIZED (
     SELECT
-        row_number() OVER () AS number, s.tid, s.cpu, s.at_ns, s.cpu_ns, s.stack, p.process_id,
-        t.thread_id
+        row_number() OVER () AS number,
+        s.tid, s.cpu, s.at_ns, s.cpu_ns, s.stack, p.process_id, t.thread_id
     FROM staging.sample_text AS s
     JOIN staging.clock AS c ON s.clock_key = c.clock_key
     JOIN staging.host AS h ON c.clock_id = h.clock_id AND coalesce(s.hostname = h.hostname, true)
@@ -29,11 +29,15 @@ run AS MATERIALIZED (
     LEFT JOIN staging.executor_event AS x ON i.effective_end_event_id = x.event_id
 ),
 around AS (
-    SELECT s.number, r.callback_instance_id, r.parent_id, s.at_ns, s.at_ns >= r.end_ns AS is_over
+    SELECT
+        s.number, r.callback_instance_id, r.parent_id, s.at_ns,
+        s.at_ns >= r.end_ns AS is_over
     FROM sample AS s
     ASOF JOIN run AS r ON s.thread_id = r.thread_id AND s.at_ns >= r.start_ns
     UNION ALL
-    SELECT a.number, r.callback_instance_id, r.parent_id, a.at_ns, a.at_ns >= r.end_ns
+    SELECT
+        a.number, r.callback_instance_id, r.parent_id, a.at_ns,
+        a.at_ns >= r.end_ns
     FROM around AS a
     JOIN run AS r ON a.parent_id = r.callback_instance_id
     WHERE a.is_over

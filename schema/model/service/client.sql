@@ -3,7 +3,9 @@
 -- grain: one row per client
 -- when: staging.client_event, staging.client_known
 WITH learned AS (
-    SELECT u.client_event_id, mode(s.service_name ORDER BY s.service_name) AS service_name
+    SELECT
+        u.client_event_id,
+        mode(s.service_name ORDER BY s.service_name) AS service_name
     FROM (SELECT DISTINCT client_event_id, service_event_id FROM staging.exchange) AS u
     JOIN raw.ros2_rcl_service_init AS s ON u.service_event_id = s.event_id
     GROUP BY u.client_event_id

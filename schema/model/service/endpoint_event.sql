@@ -9,7 +9,9 @@ WITH located AS NOT MATERIALIZED (
 ),
 resolved AS NOT MATERIALIZED (FROM staging.with_latest('located', objects)),
 first_use AS (
-    SELECT process_id, handle, min(event_id) AS event_id
+    SELECT
+        process_id, handle,
+        min(event_id) AS event_id
     FROM resolved
     WHERE object_event_id IS NULL
     GROUP BY process_id, handle

@@ -30,7 +30,8 @@ stamped AS (
     SELECT
         false AS is_request,
         c.event_id AS event_at_client,
-        s.event_id AS event_at_service, c.client_event_id, s.service_event_id
+        s.event_id AS event_at_service,
+        c.client_event_id, s.service_event_id
     FROM at_client AS c
     JOIN at_service AS s
         ON c.gid = s.gid
@@ -40,8 +41,10 @@ stamped AS (
 ),
 single_at_client AS (
     SELECT
-        is_request, gid, sequence_number, any_value(event_id) AS event_id,
-        any_value(client_event_id) AS client_event_id, any_value(stamp) AS stamp
+        is_request, gid, sequence_number,
+        any_value(event_id) AS event_id,
+        any_value(client_event_id) AS client_event_id,
+        any_value(stamp) AS stamp
     FROM at_client
     WHERE event_id NOT IN (SELECT event_at_client FROM stamped)
     GROUP BY is_request, gid, sequence_number
@@ -49,8 +52,10 @@ single_at_client AS (
 ),
 single_at_service AS (
     SELECT
-        is_request, gid, sequence_number, any_value(event_id) AS event_id,
-        any_value(service_event_id) AS service_event_id, any_value(stamp) AS stamp
+        is_request, gid, sequence_number,
+        any_value(event_id) AS event_id,
+        any_value(service_event_id) AS service_event_id,
+        any_value(stamp) AS stamp
     FROM at_service
     WHERE event_id NOT IN (SELECT event_at_service FROM stamped)
     GROUP BY is_request, gid, sequence_number, CASE WHEN is_request THEN service_event_id END

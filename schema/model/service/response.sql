@@ -5,14 +5,18 @@
 -- grain: one row per response
 -- when: staging.client_event, staging.service_event
 WITH taken_request AS (
-    SELECT service_event_id, gid, sequence_number, any_value(event_id) AS event_id
+    SELECT
+        service_event_id, gid, sequence_number,
+        any_value(event_id) AS event_id
     FROM staging.service_event
     WHERE is_request
     GROUP BY service_event_id, gid, sequence_number
     HAVING count(*) = 1
 ),
 sent_request AS (
-    SELECT client_event_id, sequence_number, any_value(event_id) AS event_id
+    SELECT
+        client_event_id, sequence_number,
+        any_value(event_id) AS event_id
     FROM staging.client_event
     WHERE is_request
     GROUP BY client_event_id, sequence_number
@@ -20,7 +24,9 @@ sent_request AS (
 ),
 -- Of the ends of the request that of the service says more: several may have taken it.
 by_client AS (
-    SELECT send_event_id, min(request_id) AS request_id
+    SELECT
+        send_event_id,
+        min(request_id) AS request_id
     FROM staging.request
     GROUP BY send_event_id
     HAVING count(*) = 1

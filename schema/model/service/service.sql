@@ -9,13 +9,17 @@
 --     rmw_handle UBIGINT
 CREATE OR REPLACE TEMP TABLE service_inferred AS
 WITH learned AS (
-    SELECT u.service_event_id, mode(c.service_name ORDER BY c.service_name) AS service_name
+    SELECT
+        u.service_event_id,
+        mode(c.service_name ORDER BY c.service_name) AS service_name
     FROM (SELECT DISTINCT client_event_id, service_event_id FROM staging.exchange) AS u
     JOIN staging.client_known AS c ON u.client_event_id = c.event_id
     GROUP BY u.service_event_id
 ),
 attached AS (
-    SELECT e.service_event_id, mode(k.service_handle ORDER BY k.service_handle) AS service_handle
+    SELECT
+        e.service_event_id,
+        mode(k.service_handle ORDER BY k.service_handle) AS service_handle
     FROM staging.service_event AS e
     JOIN staging.callback_binding AS b ON e.event_id = b.request_event_id
     JOIN staging.callback_known AS k ON b.callback_event_id = k.event_id
@@ -28,14 +32,18 @@ LEFT JOIN learned AS l ON e.event_id = l.service_event_id
 LEFT JOIN attached AS a ON e.event_id = a.service_event_id
 WHERE e.is_inferred AND e.event_id = e.service_event_id
 UNION ALL BY NAME
-SELECT owner_event_id AS event_id, process_id, any_value(handle) AS service_handle
+SELECT
+    owner_event_id AS event_id,
+    process_id,
+    any_value(handle) AS service_handle
 FROM staging.callback_owner
 WHERE kind = 'service' AND is_inferred
 GROUP BY owner_event_id, process_id;
 
 WITH every_service AS (
     SELECT
-        event_id, process_id, service_name, service_handle, rmw_service_handle AS rmw_handle,
+        event_id, process_id, service_name, service_handle,
+        rmw_service_handle AS rmw_handle,
         ts_ns AS created_ns
     FROM staging.located('raw.ros2_rcl_service_init')
     UNION ALL BY NAME

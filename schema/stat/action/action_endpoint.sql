@@ -3,8 +3,11 @@
 -- grain: one row per such object
 WITH named AS (
     SELECT
-        run_id, process_id, node_id, 'service' AS kind, service_id AS object_id,
-        service_name AS name, created_ns
+        run_id, process_id, node_id,
+        'service' AS kind,
+        service_id AS object_id,
+        service_name AS name,
+        created_ns
     FROM store.service
     UNION ALL
     SELECT run_id, process_id, node_id, 'client', client_id, service_name, created_ns

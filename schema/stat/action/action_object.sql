@@ -10,13 +10,16 @@ WITH endpoint AS MATERIALIZED (
     FROM derive.action_endpoint WHERE kind IN (of_calls, of_topics)
 )
 SELECT
-    g.run_id, g.process_id, g.node_id, g.action_name, g.created_ns, g.object_id AS goal_object_id,
+    g.run_id, g.process_id, g.node_id, g.action_name, g.created_ns,
+    g.object_id AS goal_object_id,
     any_value(o.object_id) FILTER (o.part = 'cancel_goal') AS cancel_object_id,
     any_value(o.object_id) FILTER (o.part = 'get_result') AS result_object_id,
     any_value(o.object_id) FILTER (o.part = 'feedback') AS feedback_object_id,
     any_value(o.object_id) FILTER (o.part = 'status') AS status_object_id
 FROM (
-    SELECT *, unnest(['cancel_goal', 'get_result', 'feedback', 'status']) AS other
+    SELECT
+        *,
+        unnest(['cancel_goal', 'get_result', 'feedback', 'status']) AS other
     FROM endpoint
     WHERE kind = of_calls AND part = 'send_goal'
 ) AS g

@@ -5,20 +5,29 @@
 -- param: spans VARCHAR  Name of the rows of derive.goal_span
 CREATE OR REPLACE MACRO derive.goal_alone(spans) AS TABLE
 WITH change AS (
-    SELECT action_server_id, start_ns AS at_ns, goal_id, 1 AS change FROM query_table(spans)
+    SELECT
+        action_server_id,
+        start_ns AS at_ns,
+        goal_id, 1 AS change
+    FROM query_table(spans)
     UNION ALL
-    SELECT action_server_id, end_ns, goal_id, -1 FROM query_table(spans)
+    SELECT action_server_id, end_ns, goal_id, -1
+    FROM query_table(spans)
 ),
 -- Of one open goal, the sum is its identity.
 summed AS (
-    SELECT action_server_id, at_ns, sum(change) AS change, sum(change * goal_id) AS goal_change
+    SELECT
+        action_server_id, at_ns,
+        sum(change) AS change,
+        sum(change * goal_id) AS goal_change
     FROM change
     GROUP BY action_server_id, at_ns
 ),
 open AS (
     SELECT
         action_server_id, at_ns,
-        sum(change) OVER later AS open, sum(goal_change) OVER later AS goal_id
+        sum(change) OVER later AS open,
+        sum(goal_change) OVER later AS goal_id
     FROM summed
     WINDOW later AS (PARTITION BY action_server_id ORDER BY at_ns)
 )

@@ -13,8 +13,10 @@
 CREATE OR REPLACE MACRO derive.goal_answer(servers) AS TABLE
 WITH answer AS MATERIALIZED (
     SELECT
-        r.response_id, r.sender_thread_id AS thread_id, r.sent_ns,
-        s.status_publisher_id, coalesce(p.is_ambiguous, false) AS is_ambiguous
+        r.response_id,
+        r.sender_thread_id AS thread_id,
+        r.sent_ns, s.status_publisher_id,
+        coalesce(p.is_ambiguous, false) AS is_ambiguous
     FROM store.response AS r
     JOIN query_table(servers) AS s ON r.service_id = s.action_server_id
     JOIN store.process AS p ON s.process_id = p.process_id
@@ -30,15 +32,22 @@ call AS (
     SELECT sender_thread_id, sent_ns, receiver_thread_id, taken_ns FROM store.response
 ),
 deed AS (
-    SELECT thread_id, at_ns, NULL::BIGINT AS publisher_id FROM executing
+    SELECT
+        thread_id, at_ns,
+        NULL::BIGINT AS publisher_id
+    FROM executing
     UNION ALL
-    SELECT thread_id, start_ns, publisher_id FROM store.publication
+    SELECT thread_id, start_ns, publisher_id
+    FROM store.publication
     UNION ALL
-    SELECT thread_id, taken_ns, NULL FROM store.take
+    SELECT thread_id, taken_ns, NULL
+    FROM store.take
     UNION ALL
-    SELECT sender_thread_id, sent_ns, NULL FROM call
+    SELECT sender_thread_id, sent_ns, NULL
+    FROM call
     UNION ALL
-    SELECT receiver_thread_id, taken_ns, NULL FROM call
+    SELECT receiver_thread_id, taken_ns, NULL
+    FROM call
 ),
 followed AS (
     SELECT

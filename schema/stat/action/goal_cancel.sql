@@ -8,7 +8,8 @@ CREATE OR REPLACE MACRO derive.goal_cancel(servers, alone) AS TABLE
 WITH asked AS MATERIALIZED (
     SELECT
         q.run_id, q.request_id, s.action_server_id, s.status_publisher_id, r.sender_thread_id,
-        q.sent_ns, q.taken_ns, r.sent_ns AS answered_ns
+        q.sent_ns, q.taken_ns,
+        r.sent_ns AS answered_ns
     FROM store.request AS q
     JOIN query_table(servers) AS s ON q.service_id = s.cancel_service_id
     JOIN store.response AS r ON q.request_id = r.request_id
@@ -17,7 +18,8 @@ WITH asked AS MATERIALIZED (
 -- A thread may take several requests at once: behind another response, the status may be of that.
 published AS (
     SELECT
-        a.request_id, min(b.start_ns) AS published_ns,
+        a.request_id,
+        min(b.start_ns) AS published_ns,
         arg_min(b.publication_id, b.start_ns) AS publication_id
     FROM asked AS a
     JOIN store.publication AS b

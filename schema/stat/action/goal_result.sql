@@ -36,7 +36,8 @@ goal AS (
 ),
 asked AS (
     SELECT
-        q.request_id, coalesce(c.action_client_id, -s.action_server_id) AS party,
+        q.request_id,
+        coalesce(c.action_client_id, -s.action_server_id) AS party,
         CASE
             WHEN c.action_client_id IS NULL THEN q.taken_ns ELSE coalesce(q.sent_ns, q.taken_ns)
         END AS at_ns
@@ -46,7 +47,9 @@ asked AS (
     WHERE c.action_client_id IS NOT NULL OR s.action_server_id IS NOT NULL
 ),
 followed AS (
-    SELECT r.request_id AS goal_id, a.request_id
+    SELECT
+        r.request_id AS goal_id,
+        a.request_id
     FROM derive.certain_call AS l
     JOIN asked AS a ON l.request_id = a.request_id
     JOIN store.response AS r ON l.taken_response_id = r.response_id
@@ -54,20 +57,30 @@ followed AS (
     QUALIFY count(*) OVER (PARTITION BY r.request_id) = 1
 ),
 step AS (
-    SELECT *, row_number() OVER (
-        PARTITION BY party ORDER BY at_ns, change DESC, goal_id, request_id
-    ) AS number
+    SELECT
+        *,
+        row_number() OVER (
+            PARTITION BY party ORDER BY at_ns, change DESC, goal_id, request_id
+        ) AS number
     FROM (
-        SELECT party, at_ns, goal_id, NULL::BIGINT AS request_id, 1 AS change FROM goal
+        SELECT
+            party, at_ns, goal_id,
+            NULL::BIGINT AS request_id,
+            1 AS change
+        FROM goal
         UNION ALL
-        SELECT party, at_ns, NULL, request_id, -1 FROM asked
+        SELECT party, at_ns, NULL, request_id, -1
+        FROM asked
     ) AS s
     WHERE NOT EXISTS (
         FROM followed AS f WHERE s.goal_id = f.goal_id OR s.request_id = f.request_id
     )
 ),
 summed AS (
-    SELECT *, sum(change) OVER (PARTITION BY party ORDER BY number) AS balance FROM step
+    SELECT
+        *,
+        sum(change) OVER (PARTITION BY party ORDER BY number) AS balance
+    FROM step
 ),
 -- A request without an open goal leaves none open: the sum begins anew.
 counted AS (

@@ -34,7 +34,10 @@ span AS (
     WHERE g.taken_ns IS NOT NULL AND g.is_accepted IS DISTINCT FROM false
     GROUP BY g.run_id, g.goal_id, g.action_server_id, g.answered_ns, g.taken_ns
     UNION ALL
-    SELECT u.run_id, NULL, u.action_server_id, coalesce(l.start_ns, 0), u.sent_ns, false
+    SELECT
+        u.run_id, NULL, u.action_server_id,
+        coalesce(l.start_ns, 0),
+        u.sent_ns, false
     FROM unseen AS u
     ASOF LEFT JOIN derive.host_gap AS l ON u.host_id = l.host_id AND u.begun_ns >= l.start_ns
     -- A client may ask for a result once more.
@@ -55,6 +58,7 @@ placed AS (
         )
 )
 SELECT
-    *, is_begun_during_other
+    *,
+    is_begun_during_other
     OR (next_start_ns IS NOT NULL AND coalesce(next_start_ns < end_ns, true)) AS is_overlapping
 FROM placed

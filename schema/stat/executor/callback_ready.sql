@@ -15,7 +15,9 @@ CREATE OR REPLACE MACRO derive.callback_ready(
     executors, has_calls := true, has_teams := true
 ) AS TABLE
 WITH sized AS (
-    SELECT e.executor_id, e.until_ns, s.thread_count, x.kind = 'events' AS is_in_order
+    SELECT
+        e.executor_id, e.until_ns, s.thread_count,
+        x.kind = 'events' AS is_in_order
     FROM query_table(executors) AS e
     JOIN derive.executor_size AS s ON e.executor_id = s.executor_id
     JOIN store.executor AS x ON e.executor_id = x.executor_id
@@ -36,7 +38,8 @@ release AS (
 -- another thread may have gone to wait in the meantime.
 picked AS (
     SELECT
-        r.*, CASE WHEN r.thread_count = 1 THEN r.start_ns ELSE s.start_ns END AS picked_ns
+        r.*,
+        CASE WHEN r.thread_count = 1 THEN r.start_ns ELSE s.start_ns END AS picked_ns
     FROM release AS r
     ASOF LEFT JOIN (
         SELECT e.thread_id, e.start_ns
@@ -48,8 +51,11 @@ picked AS (
 ),
 polled AS (
     SELECT
-        p.*, w.start_ns AS wait_start_ns, w.end_ns AS wait_end_ns,
-        w.previous_end_ns AS previous_wait_end_ns, w.asleep_ns
+        p.*,
+        w.start_ns AS wait_start_ns,
+        w.end_ns AS wait_end_ns,
+        w.previous_end_ns AS previous_wait_end_ns,
+        w.asleep_ns
     FROM picked AS p
     ASOF LEFT JOIN derive.executor_poll('sized') AS w
         ON p.executor_id = w.executor_id AND p.picked_ns >= w.end_ns

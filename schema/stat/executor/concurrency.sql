@@ -7,12 +7,14 @@ CREATE OR REPLACE MACRO derive.concurrency(callbacks) AS TABLE
 WITH edge AS (
     SELECT
         executor_id, callback_id, enough,
-        unnest([start_ns, end_ns]) AS at_ns, unnest([1, -1]) AS step
+        unnest([start_ns, end_ns]) AS at_ns,
+        unnest([1, -1]) AS step
     FROM query_table(callbacks)
 ),
 level AS (
     SELECT
-        executor_id, callback_id, enough, at_ns AS start_ns,
+        executor_id, callback_id, enough,
+        at_ns AS start_ns,
         lead(at_ns) OVER in_time AS end_ns,
         sum(step) OVER (in_time ROWS UNBOUNDED PRECEDING) AS running
     FROM edge

@@ -3,9 +3,15 @@
 -- grain: one row per such stretch
 WITH run AS (
     SELECT
-        r.executor_id, NULL::BIGINT AS callback_id, r.start_ns, r.end_ns, s.thread_count AS enough
+        r.executor_id,
+        NULL::BIGINT AS callback_id,
+        r.start_ns, r.end_ns,
+        s.thread_count AS enough
     FROM derive.executor_run AS r
     JOIN derive.executor_size AS s ON r.executor_id = s.executor_id
 )
-SELECT executor_id, enough AS thread_count, start_ns, end_ns, before_ns
+SELECT
+    executor_id,
+    enough AS thread_count,
+    start_ns, end_ns, before_ns
 FROM derive.concurrency('run')

@@ -22,15 +22,19 @@ run AS (
 -- that was under way when the wait began, or the one before it, to the last that began before its
 -- end. There are none, as a rule, where the last one was over when the wait began.
 pair AS (
-    SELECT w.*, unnest(range(coalesce(f.position, 1), l.position + 1)) AS position
+    SELECT
+        w.*,
+        unnest(range(coalesce(f.position, 1), l.position + 1)) AS position
     FROM waiting AS w
     ASOF JOIN run AS l ON w.thread_id = l.thread_id AND w.start_ns > l.start_ns
     ASOF LEFT JOIN run AS f ON w.thread_id = f.thread_id AND w.from_ns >= f.start_ns
     WHERE l.end_ns > w.from_ns
 )
 SELECT
-    p.run_id, p.callback_instance_id, r.callback_instance_id AS meanwhile_id,
-    r.callback_id AS meanwhile_callback_id, p.executor_id, p.thread_id,
+    p.run_id, p.callback_instance_id,
+    r.callback_instance_id AS meanwhile_id,
+    r.callback_id AS meanwhile_callback_id,
+    p.executor_id, p.thread_id,
     least(r.end_ns, p.start_ns) - greatest(r.start_ns, p.from_ns) AS overlap_ns,
     greatest(least(r.end_ns, p.start_ns) - greatest(r.start_ns, p.latest_ns), 0) AS certain_ns
 FROM pair AS p

@@ -4,7 +4,10 @@
 -- param: waits VARCHAR  Name of rows as of derive.callback_ready
 CREATE OR REPLACE MACRO derive.executor_queue(waits) AS TABLE
 WITH waiting AS MATERIALIZED (
-    SELECT callback_instance_id, thread_id, coalesce(earliest_ns, latest_ns) AS from_ns, start_ns
+    SELECT
+        callback_instance_id, thread_id,
+        coalesce(earliest_ns, latest_ns) AS from_ns,
+        start_ns
     FROM query_table(waits)
     WHERE coalesce(earliest_ns, latest_ns) IS NOT NULL
         AND thread_id IN (SELECT thread_id FROM store.thread_state)
@@ -25,7 +28,9 @@ outside AS MATERIALIZED (
 ),
 -- These follow each other on a thread, so those that overlap a wait are neighbours.
 pair AS MATERIALIZED (
-    SELECT w.*, unnest(range(coalesce(f.number, 1), l.number + 1)) AS number
+    SELECT
+        w.*,
+        unnest(range(coalesce(f.number, 1), l.number + 1)) AS number
     FROM waiting AS w
     ASOF JOIN outside AS l ON w.thread_id = l.thread_id AND w.start_ns > l.start_ns
     ASOF LEFT JOIN outside AS f ON w.thread_id = f.thread_id AND w.from_ns >= f.start_ns
@@ -49,7 +54,8 @@ summed AS (
 ),
 preemptor AS (
     SELECT
-        o.thread_id, o.number, p.start_ns, p.end_ns, coalesce(t.name, x.name) AS name
+        o.thread_id, o.number, p.start_ns, p.end_ns,
+        coalesce(t.name, x.name) AS name
     FROM store.preemptor AS p
     ASOF JOIN outside AS o ON p.thread_id = o.thread_id AND p.start_ns >= o.start_ns
     LEFT JOIN store.thread AS t ON p.preemptor_thread_id = t.thread_id

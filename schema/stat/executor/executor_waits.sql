@@ -71,7 +71,12 @@ blocked AS (
     ASOF LEFT JOIN blocking AS s
         ON b.kind = s.kind AND b.exclusion_id = s.exclusion_id AND b.start_ns >= s.start_ns
 ),
-looked_up AS (SELECT DISTINCT executor_id, NULL::BIGINT AS until_ns FROM ready),
+looked_up AS (
+    SELECT DISTINCT
+        executor_id,
+        NULL::BIGINT AS until_ns
+    FROM ready
+),
 poll AS MATERIALIZED (
     SELECT executor_id, start_ns, end_ns, before_ns FROM derive.executor_poll('looked_up')
 ),

@@ -57,7 +57,8 @@ seen AS (
 ),
 pause AS MATERIALIZED (
     SELECT
-        thread_id, end_ns AS start_ns,
+        thread_id,
+        end_ns AS start_ns,
         lead(start_ns) OVER on_thread AS end_ns,
         lead(due_ns) OVER on_thread AS due_ns
     FROM seen
@@ -65,7 +66,10 @@ pause AS MATERIALIZED (
     QUALIFY lead(start_ns) OVER on_thread > seen.end_ns
 ),
 slept AS MATERIALIZED (
-    SELECT p.thread_id, p.start_ns AS pause_ns, s.start_ns, s.end_ns
+    SELECT
+        p.thread_id,
+        p.start_ns AS pause_ns,
+        s.start_ns, s.end_ns
     FROM (SELECT * FROM thread_state WHERE state = 'sleeping') AS s
     ASOF JOIN pause AS p ON s.thread_id = p.thread_id AND s.start_ns >= p.start_ns
     WHERE s.end_ns <= p.end_ns
@@ -73,11 +77,17 @@ slept AS MATERIALIZED (
 -- It is awake from the begin of a pause, or the end of a sleep, to the next sleep.
 awake AS (
     SELECT
-        thread_id, from_ns AS start_ns,
+        thread_id,
+        from_ns AS start_ns,
         coalesce(lead(until_ns) OVER (PARTITION BY thread_id, pause_ns ORDER BY from_ns), end_ns)
             AS end_ns
     FROM (
-        SELECT thread_id, start_ns AS pause_ns, start_ns AS from_ns, NULL AS until_ns, end_ns
+        SELECT
+            thread_id,
+            start_ns AS pause_ns,
+            start_ns AS from_ns,
+            NULL AS until_ns,
+            end_ns
         FROM pause
         WHERE thread_id IN (SELECT thread_id FROM thread_state)
         UNION ALL
@@ -87,14 +97,20 @@ awake AS (
     )
 ),
 activity AS (
-    SELECT thread_id, 'wait' AS activity, start_ns, end_ns FROM slept
+    SELECT
+        thread_id,
+        'wait' AS activity,
+        start_ns, end_ns
+    FROM slept
     UNION ALL
     SELECT a.thread_id, 'select', a.start_ns, a.end_ns
     FROM awake AS a
     ASOF JOIN thread_state AS s ON a.thread_id = s.thread_id AND a.start_ns >= s.start_ns
     WHERE s.end_ns > a.start_ns AND s.state <> 'unknown'
     UNION ALL
-    SELECT thread_id, 'wait', start_ns, least(due_ns, end_ns)
+    SELECT
+        thread_id, 'wait', start_ns,
+        least(due_ns, end_ns)
     FROM pause
     WHERE due_ns > start_ns AND thread_id NOT IN (SELECT thread_id FROM thread_state)
 )

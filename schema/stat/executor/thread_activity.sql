@@ -26,15 +26,23 @@ thread_break AS NOT MATERIALIZED (
 ),
 -- A callback never seen to end was over at the first event that cannot be inside of it.
 outside AS (
-    SELECT start_event_id AS event_id, thread_id, start_ns AS at_ns FROM executor_state
+    SELECT
+        start_event_id AS event_id,
+        thread_id,
+        start_ns AS at_ns
+    FROM executor_state
     UNION ALL
-    SELECT start_event_id, thread_id, start_ns FROM instance
+    SELECT start_event_id, thread_id, start_ns
+    FROM instance
     UNION ALL
-    SELECT resumed_event_id, thread_id, resumed_ns FROM thread_break
+    SELECT resumed_event_id, thread_id, resumed_ns
+    FROM thread_break
 ),
 closed AS (
     SELECT
-        i.run_id, i.thread_id, i.effective_end_event_id AS event_id, any_value(x.at_ns) AS at_ns,
+        i.run_id, i.thread_id,
+        i.effective_end_event_id AS event_id,
+        any_value(x.at_ns) AS at_ns,
         i.callback_instance_id, i.parent_id
     FROM instance AS i
     JOIN outside AS x ON i.thread_id = x.thread_id AND i.effective_end_event_id = x.event_id
@@ -43,8 +51,13 @@ closed AS (
 ),
 change AS (
     SELECT
-        run_id, thread_id, resumed_event_id AS event_id, 0 AS step, resumed_ns AS at_ns,
-        NULL::BIGINT AS running_id, 0 AS state, NULL AS kind
+        run_id, thread_id,
+        resumed_event_id AS event_id,
+        0 AS step,
+        resumed_ns AS at_ns,
+        NULL::BIGINT AS running_id,
+        0 AS state,
+        NULL AS kind
     FROM thread_break
     UNION ALL
     SELECT run_id, thread_id, end_event_id, 1, end_ns, parent_id, 0, NULL
@@ -55,7 +68,8 @@ change AS (
     UNION ALL
     SELECT
         run_id, thread_id, start_event_id, 2, start_ns, NULL,
-        CASE state WHEN 'wait' THEN 1 WHEN 'process' THEN 2 ELSE 3 END, NULL
+        CASE state WHEN 'wait' THEN 1 WHEN 'process' THEN 2 ELSE 3 END,
+        NULL
     FROM executor_state
     SEMI JOIN derive.delimited_run USING (run_id)
     UNION ALL
@@ -146,7 +160,8 @@ described AS (
 ),
 classified AS (
     SELECT
-        t.run_id, t.thread_id, x.executor_id, t.at_ns AS start_ns,
+        t.run_id, t.thread_id, x.executor_id,
+        t.at_ns AS start_ns,
         CASE WHEN t.next_step > 0 THEN t.next_ns END AS end_ns,
         t.callback_instance_id,
         CASE

@@ -33,7 +33,9 @@ WITH RECURSIVE call AS MATERIALIZED (
 ),
 slice AS MATERIALIZED (
     SELECT
-        callback_id, slice, any_value(period_ns) AS period_ns, any_value(slack_ns) AS slack_ns,
+        callback_id, slice,
+        any_value(period_ns) AS period_ns,
+        any_value(slack_ns) AS slack_ns,
         lead(slice) OVER (PARTITION BY callback_id ORDER BY slice) AS next_slice,
         list(start_ns - created_ns) AS ages
     FROM call
@@ -42,7 +44,10 @@ slice AS MATERIALIZED (
 -- By how much the grid has moved, and how late punctual calls were at first.
 followed AS (
     SELECT
-        callback_id, NULL::BIGINT AS slice, min(slice) AS next_slice, 0::BIGINT AS moved_ns,
+        callback_id,
+        NULL::BIGINT AS slice,
+        min(slice) AS next_slice,
+        0::BIGINT AS moved_ns,
         NULL::BIGINT AS usual_ns
     FROM slice
     GROUP BY callback_id
@@ -98,7 +103,8 @@ due AS (
 -- Up to when the threads of an executor had run callbacks, on average, for how long.
 ran AS MATERIALIZED (
     SELECT
-        r.executor_id, r.end_ns, r.end_ns - r.start_ns AS last_ns,
+        r.executor_id, r.end_ns,
+        r.end_ns - r.start_ns AS last_ns,
         sum((r.end_ns - r.start_ns) / s.thread_count) OVER (
             PARTITION BY r.executor_id ORDER BY r.end_ns
         ) AS ran_ns

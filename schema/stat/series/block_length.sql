@@ -13,7 +13,10 @@ WITH part AS MATERIALIZED (
     FROM query_table(parts)
 ),
 variance AS (
-    SELECT side, subject, statistic, avg(part) AS mean, nullif(var_pop(part), 0) AS variance
+    SELECT
+        side, subject, statistic,
+        avg(part) AS mean,
+        nullif(var_pop(part), 0) AS variance
     FROM part
     GROUP BY side, subject, statistic
 ),

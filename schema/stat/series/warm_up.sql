@@ -4,7 +4,9 @@
 -- grain: one row per side and subject with three values of the first quarter that exceed all later
 --     ones
 CREATE OR REPLACE MACRO derive.warm_up(parts) AS TABLE
-SELECT side, subject, max(at_ns) AS last_ns
+SELECT
+    side, subject,
+    max(at_ns) AS last_ns
 FROM (
     SELECT
         side, subject, number, position, at_ns, value_ns,
