@@ -40,8 +40,9 @@ WHERE s.process_id IN (
 );
 
 -- Threads of the executors that are named. If a thread serves several of them, it belongs to the
--- one whose callbacks it ran most. when: staging.callback_group_member, staging.python_mark WHERE
--- kind = 'executor' columns: thread_id BIGINT, executor_event_id BIGINT
+-- one whose callbacks it ran most.
+-- when: staging.callback_group_member, staging.python_mark WHERE kind = 'executor'
+-- columns: thread_id BIGINT, executor_event_id BIGINT
 CREATE OR REPLACE TEMP TABLE thread_executor AS
 SELECT thread_id, executor_event_id
 FROM (
