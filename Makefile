@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 DEMO := .demo
 HAS_BT2 := $(BIN)/python -c 'from msgflow.trace.bt2_library import load; load()' 2>/dev/null
 HAS_LTTNG := { command -v lttng-sessiond && command -v gcc && gcc -E -include lttng/tracepoint.h -xc /dev/null; } >/dev/null 2>&1
-HAS_CHROMIUM := PYTHONPATH=tests/support $(BIN)/python -c 'from browser import find_browser; exit(not find_browser())'
+HAS_CHROMIUM := PYTHONPATH=tests $(BIN)/python -c 'from support.browser import find_browser; exit(not find_browser())'
 
 # Python compiles a module when it is first imported. To compile all that is installed, of which most
 # is never imported, takes longer than the rest of an installation.

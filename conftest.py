@@ -14,10 +14,10 @@ from typing import Any
 
 import duckdb
 import pytest
-import thorough
-from analysis import Analysis
 from hypothesis import settings
-from ingested import made_once
+from support import thorough
+from support.analysis import Analysis
+from support.ingested import made_once
 from typer.testing import CliRunner, Result
 
 from msgflow.cli.app import app
@@ -26,7 +26,7 @@ from msgflow.ingest import ingest
 from msgflow.trace import bt2_library
 from msgflow_sim import simulate
 
-pytest_plugins = ["golden"]
+pytest_plugins = ["support.golden"]
 
 ROOT = Path(__file__).resolve().parent
 _QUICK = "not thorough"
@@ -122,7 +122,7 @@ def fresh_database(empty_database: Path, tmp_path: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def _small_database(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from golden import fill_case
+    from support.golden import fill_case
 
     path = tmp_path_factory.mktemp("small") / "msgflow.duckdb"
     shutil.copyfile(empty_database, path)

@@ -36,9 +36,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from fleet_cluster import (
+from support.fleet_cluster import (
     NODE,
     Watcher,
     children,
@@ -48,8 +48,8 @@ from fleet_cluster import (
     start_ingest,
     wait_for,
 )
-from fleet_robots import record, robot_of, write_broken
-from object_store import ObjectStore, object_store
+from support.fleet_robots import record, robot_of, write_broken
+from support.object_store import ObjectStore, object_store
 
 from msgflow import Database
 from msgflow.fleet.lake import Lake

@@ -46,9 +46,9 @@ from pathlib import Path
 from random import Random
 from typing import TYPE_CHECKING, Any
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from mutations import (
+from support.mutations import (
     ANYWHERE,
     MUTATIONS,
     STRUCTURAL,

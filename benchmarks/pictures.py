@@ -33,8 +33,8 @@ from msgflow.database import open_db
 from msgflow.ingest import ingest
 from msgflow_sim import simulate
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
-from browser import ARGUMENTS, find_browser
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+from support.browser import ARGUMENTS, find_browser
 
 EVENTS_PER_FACTOR = 66_000
 # Callback instances, publications, takes and states of executors.

@@ -20,7 +20,7 @@ from msgflow.ingest import ingest
 from msgflow_sim import simulate
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
-from browser import ARGUMENTS, find_browser
+from support.browser import ARGUMENTS, find_browser
 
 IMAGES = Path(__file__).parent / "images"
 EXAMPLES = Path(__file__).parents[1] / "examples"

@@ -15,7 +15,7 @@ from duckdb_engine import Dialect
 from sqlalchemy import Column, MetaData, create_engine, func, select
 from sqlalchemy.engine import Connection
 from sqlalchemy.exc import ProgrammingError
-from thorough import thorough
+from support.thorough import thorough
 
 from msgflow.schema import public, store
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import duckdb
 import pytest
-from thorough import few
+from support.thorough import few
 
 from msgflow.errors import TraceError
 from msgflow.trace import bt2_library

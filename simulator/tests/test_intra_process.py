@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 import pytest
-from thorough import few
+from support.thorough import few
 
 from msgflow_sim import simulate
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from thorough import few
+from support.thorough import few
 
 from msgflow_sim import Publisher, layouts, scenarios, simulate
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from thorough import few
+from support.thorough import few
 
 from msgflow.errors import UsageError
 from msgflow_sim import MessageLink, Node, Publisher, Subscription, scenarios

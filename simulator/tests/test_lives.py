@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 
 import pytest
-from thorough import few
+from support.thorough import few
 
 MILLISECOND = 1_000_000
 

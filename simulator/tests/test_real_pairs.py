@@ -9,7 +9,7 @@ from pathlib import Path
 import duckdb
 import pyarrow as pa
 import pytest
-from thorough import few
+from support.thorough import few
 
 from msgflow import trace
 from msgflow_sim import simulate

@@ -11,7 +11,7 @@ from dataclasses import replace
 import duckdb
 import pyarrow.parquet as pq
 import pytest
-from thorough import few
+from support.thorough import few
 
 from msgflow.errors import UsageError
 from msgflow_sim import Buffers, Recording, long_recording, simulate

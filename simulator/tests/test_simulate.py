@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
-from thorough import SHOWN, few
+from support.thorough import SHOWN, few
 
 from msgflow.errors import UsageError
 from msgflow_sim import Host, Node, Process, Scenario, Subscription, Timer, scenarios, simulate

@@ -15,7 +15,7 @@ from typing import Any
 import duckdb
 import pyarrow as pa
 import pytest
-from thorough import few
+from support.thorough import few
 
 from msgflow.bag.messages import read_bag
 from msgflow.database import open_db

@@ -11,7 +11,7 @@ from typing import IO
 
 import duckdb
 import pytest
-from golden import insert
+from support.golden import insert
 from typer.testing import Result
 
 from msgflow.db.derivation import derive_findings
@@ -21,7 +21,7 @@ Msgflow = Callable[..., Result]
 
 @pytest.fixture(scope="module")
 def _good(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from golden import BASE
+    from support.golden import BASE
 
     path = Path(shutil.copy(empty_database, tmp_path_factory.mktemp("good") / "msgflow.duckdb"))
     with duckdb.connect(str(path)) as connection:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ingested import contents
+from support.ingested import contents
 from typer.testing import CliRunner, Result
 
 from msgflow import open_db

@@ -8,7 +8,7 @@ from pathlib import Path
 import duckdb
 import pyarrow.parquet as pq
 import pytest
-from thorough import few, thorough
+from support.thorough import few, thorough
 from typer.testing import Result
 
 from msgflow.db.objects import public_names

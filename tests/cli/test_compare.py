@@ -9,7 +9,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from golden import fill_case
+from support.golden import fill_case
 from typer.testing import Result
 
 Msgflow = Callable[..., Result]

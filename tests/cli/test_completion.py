@@ -13,8 +13,8 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from hostile import HOSTILE, renamed
-from thorough import few
+from support.hostile import HOSTILE, renamed
+from support.thorough import few
 
 from msgflow.db.known_names import known_names
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import duckdb
 import pytest
-from thorough import few, thorough
+from support.thorough import few, thorough
 from typer.testing import Result
 
 from msgflow.query.catalogue import load_queries

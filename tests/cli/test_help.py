@@ -8,8 +8,8 @@ from importlib import import_module
 
 import pytest
 import typer
-from each import each
 from rich.cells import cell_len
+from support.each import each
 from typer.testing import Result
 
 from msgflow.cli.app import COMMANDS

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from golden import fill_case
-from ingested import made_once
+from support.golden import fill_case
+from support.ingested import made_once
 from typer.testing import Result
 
 from msgflow.db.derivation import derive

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from thorough import thorough
+from support.thorough import thorough
 
 import msgflow
 

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
-from thorough import few, thorough
+from support.thorough import few, thorough
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app

@@ -10,7 +10,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from thorough import few
+from support.thorough import few
 
 PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
 COMMAND = """

@@ -15,8 +15,8 @@ from typing import Any
 
 import duckdb
 import pytest
-from ingested import contents
-from thorough import thorough
+from support.ingested import contents
+from support.thorough import thorough
 from typer.testing import Result
 
 from msgflow.database import Database

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from thorough import few
+from support.thorough import few
 
 from msgflow.ingest import ingest
 

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from thorough import few, thorough
+from support.thorough import few, thorough
 
 from msgflow.errors import ExitCode
 

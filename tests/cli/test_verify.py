@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import duckdb
 import pytest
-from thorough import few, thorough
+from support.thorough import few, thorough
 from typer.testing import Result
 
 Msgflow = Callable[..., Result]

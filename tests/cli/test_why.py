@@ -9,9 +9,9 @@ from typing import Any
 
 import duckdb
 import pytest
-from golden import SYSTEMS, fill_case
 from rich.cells import cell_len
-from thorough import few, thorough
+from support.golden import SYSTEMS, fill_case
+from support.thorough import few, thorough
 from typer.testing import Result
 
 from msgflow import Database

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from drifting_clocks import Clock, fill_clocks
+from support.drifting_clocks import Clock, fill_clocks
 
 from msgflow.clocks.clocks_file import read_clock_sync
 from msgflow.clocks.correction import set_clocks

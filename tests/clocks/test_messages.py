@@ -8,11 +8,11 @@ from random import Random
 
 import duckdb
 import pytest
-from drifting_clocks import Clock, Delay, Way, fill_clocks
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from possible_lines import Bound, PossibleLines
-from thorough import examples, thorough
+from support.drifting_clocks import Clock, Delay, Way, fill_clocks
+from support.possible_lines import Bound, PossibleLines
+from support.thorough import examples, thorough
 
 from msgflow.clocks.clocks_file import read_clock_sync
 from msgflow.clocks.correction import set_clocks

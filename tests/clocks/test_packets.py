@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ingested import rows
-from kernel_traces import TCP, UDP, Header
-from network import SECOND, Network, traffic
+from support.ingested import rows
+from support.kernel_traces import TCP, UDP, Header
+from support.network import SECOND, Network, traffic
 
 from msgflow import open_db
 from msgflow_sim import simulate

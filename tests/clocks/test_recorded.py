@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from thorough import few
+from support.thorough import few
 
 from msgflow import open_db
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from clock_bounds import judge
-from thorough import few
+from support.clock_bounds import judge
+from support.thorough import few
 
 from msgflow import open_db
 from msgflow_sim import simulate

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from processes import children_of, has_ended
+from support.processes import children_of, has_ended
 
 from msgflow.cli.sql_process import MOST_BYTES, WarmSql
 from msgflow.confined.process import ConfinedProcess, LateError

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from thorough import few
+from support.thorough import few
 
 import msgflow
 from msgflow.db import migration, objects

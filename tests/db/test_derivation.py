@@ -7,9 +7,9 @@ from graphlib import CycleError
 from pathlib import Path
 
 import duckdb
-import golden
 import pytest
-from thorough import thorough
+from support import golden
+from support.thorough import thorough
 
 from msgflow.db import derivation, objects
 from msgflow.db.sandbox import open_file

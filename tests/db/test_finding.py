@@ -6,9 +6,9 @@ import shutil
 from pathlib import Path
 
 import duckdb
-import golden
 import pytest
-from golden import derived_for, fill, insert_case
+from support import golden
+from support.golden import derived_for, fill, insert_case
 
 from msgflow.db import objects
 from msgflow.db.derivation import derive, derive_findings, derive_table, learn_topics

@@ -14,7 +14,7 @@ from unittest.mock import Mock
 
 import duckdb
 import pytest
-from thorough import examples, thorough
+from support.thorough import examples, thorough
 
 from msgflow.db import derivation, migration, objects
 from msgflow.db.connection import INGEST_AGAIN, connect, recorded_revision

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import duckdb
-import golden
 import pytest
+from support import golden
 
 from msgflow.db.finding import broken_relations
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from sql_attack import ALLOWED, SECRET, STATEMENTS, answered, attack, content
-from thorough import few
+from support.sql_attack import ALLOWED, SECRET, STATEMENTS, answered, attack, content
+from support.thorough import few
 
 import msgflow
 from msgflow.db.connection import connect

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from golden import fill_case
+from support.golden import fill_case
 
 from msgflow.sql.header import parse
 

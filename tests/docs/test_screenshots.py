@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from browser import find_browser
+from support.browser import find_browser
 
 ROOT = Path(__file__).resolve().parents[2]
 IMAGES = ROOT / "docs" / "images"

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from thorough import thorough
+from support.thorough import thorough
 
 _LINE = re.compile(
     r"\[(?P<time>[-0-9]+ [:0-9.]+)\] (?P<host>\S+) (?P<name>\S+): \{ cpu_id = (?P<cpu>\d+) \}, "

@@ -11,7 +11,7 @@ from typing import Any
 
 import pyarrow.parquet
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_trace
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
 from msgflow.errors import TraceError, UsageError

@@ -9,7 +9,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_trace
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
 from msgflow.events.formats import EventFormat

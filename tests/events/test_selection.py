@@ -6,7 +6,7 @@ from typing import Any
 
 import pyarrow as pa
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_trace
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
 from msgflow.errors import UsageError

@@ -6,7 +6,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_trace
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
 from msgflow.errors import TraceError, UsageError

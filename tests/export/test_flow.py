@@ -10,7 +10,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from golden import fill_case, insert
+from support.golden import fill_case, insert
 
 from msgflow import Database, UsageError
 from msgflow.export.flow import tree_text

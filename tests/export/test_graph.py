@@ -11,7 +11,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from golden import fill_case
+from support.golden import fill_case
 
 from msgflow import Database, UsageError
 from msgflow.export.graph import GraphFormat, graph_format

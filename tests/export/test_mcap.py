@@ -9,8 +9,8 @@ from typing import Any
 
 import duckdb
 import pytest
-from golden import fill_case
-from thorough import thorough
+from support.golden import fill_case
+from support.thorough import thorough
 
 from msgflow import Database, UsageError
 

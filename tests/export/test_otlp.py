@@ -11,7 +11,7 @@ from typing import Any
 
 import duckdb
 import pytest
-from golden import fill_case
+from support.golden import fill_case
 
 from msgflow import Database, UsageError
 

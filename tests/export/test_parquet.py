@@ -13,8 +13,8 @@ import polars
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from golden import fill_case
-from thorough import few, thorough
+from support.golden import fill_case
+from support.thorough import few, thorough
 
 from msgflow import Database, UsageError, __version__
 from msgflow.db.connection import recorded_revision

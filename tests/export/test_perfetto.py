@@ -13,7 +13,7 @@ from typing import Any
 
 import duckdb
 import pytest
-from thorough import few
+from support.thorough import few
 
 from msgflow import Database, DatabaseError, UsageError
 from msgflow.database import open_db

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ingested import made_once
-from lakes import copied
+from support.ingested import made_once
+from support.lakes import copied
 
 from msgflow import Database
 from msgflow.fleet.lake import Lake

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fleet_cluster import (
+from support.fleet_cluster import (
     NODE,
     Watcher,
     parent_of,
@@ -24,7 +24,7 @@ from fleet_cluster import (
     start_ingest,
     wait_for,
 )
-from object_store import KEYS, ObjectStore, object_store
+from support.object_store import KEYS, ObjectStore, object_store
 
 from msgflow import Database
 from msgflow.fleet.lake import Lake

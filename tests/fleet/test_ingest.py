@@ -17,7 +17,7 @@ from typing import Any
 import duckdb
 import pyarrow as pa
 import pytest
-from ingested import made_once
+from support.ingested import made_once
 from typer.testing import CliRunner, Result
 
 from msgflow import Database

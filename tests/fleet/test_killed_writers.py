@@ -13,7 +13,7 @@ from typing import Any
 
 import duckdb
 import pytest
-from lakes import content, copied, paths, read, rows_of
+from support.lakes import content, copied, paths, read, rows_of
 
 from msgflow.fleet.lake import Lake
 from msgflow.fleet.part import ANSWERS

@@ -10,7 +10,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
-from lakes import EXAMPLE, PAGE, content, paths, read, rows_of
+from support.lakes import EXAMPLE, PAGE, content, paths, read, rows_of
 from typer.testing import CliRunner
 
 from msgflow import Database

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from object_store import KEYS, ObjectStore, object_store
-from sql_attack import ALLOWED, SECRET, answered, attack, content
+from support.object_store import KEYS, ObjectStore, object_store
+from support.sql_attack import ALLOWED, SECRET, answered, attack, content
 
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.file_store import Store

@@ -12,7 +12,7 @@ import duckdb
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from thorough import few
+from support.thorough import few
 from typer.testing import CliRunner, Result
 
 from msgflow import Database

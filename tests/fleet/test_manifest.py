@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from object_store import KEYS, ObjectStore, object_store
+from support.object_store import KEYS, ObjectStore, object_store
 
 from msgflow.errors import DatabaseError, UsageError
 from msgflow.fleet.file_store import Store

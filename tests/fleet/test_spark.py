@@ -7,7 +7,7 @@ import shutil
 from typing import Any
 
 import pytest
-from lakes import PAGE, read
+from support.lakes import PAGE, read
 
 from msgflow.fleet.lake import Lake
 

@@ -10,11 +10,11 @@ from typing import Any
 import duckdb
 import pyarrow.compute as pc
 import pytest
-from analysis import Analysis
-from fates import FATES
-from golden import SYSTEMS, fill
-from ros_system import RosSystem
-from staged_events import Thread
+from support.analysis import Analysis
+from support.fates import FATES
+from support.golden import SYSTEMS, fill
+from support.ros_system import RosSystem
+from support.staged_events import Thread
 
 from msgflow.database import Database
 from msgflow.db.derivation import derive

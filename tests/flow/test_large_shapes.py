@@ -6,10 +6,10 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from analysis import Analysis
-from golden import SYSTEMS, fill
-from ros_system import RosSystem
-from staged_events import Thread
+from support.analysis import Analysis
+from support.golden import SYSTEMS, fill
+from support.ros_system import RosSystem
+from support.staged_events import Thread
 
 from msgflow.db.derivation import derive
 from msgflow.db.sandbox import open_memory

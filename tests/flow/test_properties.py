@@ -6,13 +6,13 @@ from random import Random
 from typing import Any
 
 import pytest
-from analysis import Analysis
-from fates import FATES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from random_system import random_system
-from ros_system import RosSystem
-from thorough import examples
+from support.analysis import Analysis
+from support.fates import FATES
+from support.random_system import random_system
+from support.ros_system import RosSystem
+from support.thorough import examples
 
 from msgflow.db.store_table import store_tables
 from msgflow.ingest.catalogue import load

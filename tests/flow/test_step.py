@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from analysis import Analysis
-from random_system import random_system
-from thorough import thorough
+from support.analysis import Analysis
+from support.random_system import random_system
+from support.thorough import thorough
 
 MACROS = {"forward": "flow_forward", "backward": "flow_backward", "both": "flow_both"}
 STARTS = """

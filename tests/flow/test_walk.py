@@ -8,10 +8,10 @@ from typing import Any
 
 import duckdb
 import pytest
-from analysis import Analysis
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from thorough import examples
+from support.analysis import Analysis
+from support.thorough import examples
 
 from msgflow.db import objects
 

@@ -11,8 +11,8 @@ from random import Random
 from typing import Any
 
 import pytest
-from mutations import flip_metadata
-from thorough import thorough
+from support.mutations import flip_metadata
+from support.thorough import thorough
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
 SEED = 1

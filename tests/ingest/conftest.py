@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_trace
-from ingested import made_once
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
+from support.ingested import made_once
 
 from msgflow.ingest import ingest
 from msgflow_sim import simulate

@@ -8,9 +8,9 @@ import struct
 from pathlib import Path
 
 import pytest
-from ingested import rows
-from mutations import packet_begins, streams
-from thorough import few
+from support.ingested import rows
+from support.mutations import packet_begins, streams
+from support.thorough import few
 
 import msgflow_sim as sim
 from msgflow import open_db

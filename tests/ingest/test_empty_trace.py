@@ -6,7 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from ingested import contents
+from support.ingested import contents
 
 from msgflow.db.connection import connect
 from msgflow.db.finding import read_findings

@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from ingested import contents
-from thorough import few
+from support.ingested import contents
+from support.thorough import few
 
 from msgflow.errors import ExitCode
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from ingested import made_once
-from thorough import few
+from support.ingested import made_once
+from support.thorough import few
 
 from msgflow.ingest import ingest
 

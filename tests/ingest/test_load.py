@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
-from reading_threads import reading_threads
+from support.reading_threads import reading_threads
 
 from msgflow.errors import UsageError
 from msgflow.ingest import ingest

@@ -8,9 +8,9 @@ from typing import Any
 
 import duckdb
 import pytest
-from network import Network, traffic
-from ros_system import RosSystem
-from staged_events import StagedEvents, Thread
+from support.network import Network, traffic
+from support.ros_system import RosSystem
+from support.staged_events import StagedEvents, Thread
 
 from msgflow import trace
 from msgflow.db import objects

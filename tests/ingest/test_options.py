@@ -8,8 +8,8 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from ingested import rows
-from thorough import thorough
+from support.ingested import rows
+from support.thorough import thorough
 
 from msgflow import open_db
 from msgflow.ingest import IngestProgress, ingest

@@ -8,7 +8,7 @@ from uuid import UUID
 
 import duckdb
 import pytest
-from ingested import contents
+from support.ingested import contents
 
 from msgflow import open_db
 from msgflow.ingest import ingest

@@ -7,7 +7,7 @@ import uuid
 from pathlib import Path
 
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_trace
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
 
 from msgflow.ingest.recordings import find_recordings
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import duckdb
 import pytest
-from ingested import contents, rows
+from support.ingested import contents, rows
 
 from msgflow.errors import ExitCode, UsageError
 from msgflow.ingest import ingest

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ingested import contents
-from thorough import few
+from support.ingested import contents
+from support.thorough import few
 
 from msgflow.db.workspace import workspace
 from msgflow.ingest import ingest

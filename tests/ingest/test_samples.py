@@ -14,7 +14,7 @@ from typing import Any
 
 import duckdb
 import pytest
-from thorough import examples
+from support.thorough import examples
 
 from msgflow import open_db
 from msgflow import trace as trace_package

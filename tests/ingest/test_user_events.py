@@ -12,9 +12,9 @@ from uuid import UUID
 
 import duckdb
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_trace
-from ingested import rows
-from thorough import few
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
+from support.ingested import rows
+from support.thorough import few
 
 from msgflow import open_db
 from msgflow.ingest import ingest

@@ -4,9 +4,9 @@ import shutil
 from pathlib import Path
 
 import pytest
-from analysis import Analysis
-from ros_system import RosSystem
-from staged_events import Thread
+from support.analysis import Analysis
+from support.ros_system import RosSystem
+from support.staged_events import Thread
 
 FUSION, RELAY = Thread(100, name="fusion"), Thread(200, name="relay")
 TWINS = Thread(300, name="left"), Thread(400, name="right")

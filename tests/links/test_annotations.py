@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from analysis import Analysis
-from each import each
-from ingested import contents, ingest_one, rows
-from ros_system import RosSystem
-from staged_events import Thread
-from thorough import few
+from support.analysis import Analysis
+from support.each import each
+from support.ingested import contents, ingest_one, rows
+from support.ros_system import RosSystem
+from support.staged_events import Thread
+from support.thorough import few
 
 from msgflow import Database
 from msgflow.errors import UsageError

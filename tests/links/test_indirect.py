@@ -13,8 +13,8 @@ from random import Random
 
 import duckdb
 import pytest
-from annotated_history import History, Publication, Run, reference
-from golden import insert
+from support.annotated_history import History, Publication, Run, reference
+from support.golden import insert
 
 HISTORIES = 400
 INPUTS, OUTPUTS, THREADS = 3, 2, 3

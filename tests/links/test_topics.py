@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from each import each
-from ingested import rows
+from support.each import each
+from support.ingested import rows
 
 from msgflow import Database
 from msgflow.errors import UsageError

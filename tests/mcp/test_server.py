@@ -17,7 +17,7 @@ import duckdb
 import pytest
 from mcp import Client
 from mcp.client.stdio import StdioServerParameters
-from thorough import few, thorough
+from support.thorough import few, thorough
 
 from msgflow.mcp import server as mcp_server
 

@@ -1,8 +1,8 @@
 from __future__ import annotations
 
 import pytest
-from analysis import Analyse, Analysis
-from ros_system import RosSystem
+from support.analysis import Analyse, Analysis
+from support.ros_system import RosSystem
 
 
 @pytest.fixture

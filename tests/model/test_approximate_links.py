@@ -9,10 +9,10 @@ from __future__ import annotations
 from random import Random
 
 import pytest
-from analysis import Analysis
-from ros_system import RosSystem
-from staged_events import Thread
-from thorough import few
+from support.analysis import Analysis
+from support.ros_system import RosSystem
+from support.staged_events import Thread
+from support.thorough import few
 
 from msgflow_sim.approximate_time import ApproximateTime
 

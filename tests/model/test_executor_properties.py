@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import pytest
-from analysis import Analyse, Analysis
-from random_executor import random_executor
-from thorough import few
+from support.analysis import Analyse, Analysis
+from support.random_executor import random_executor
+from support.thorough import few
 
 from msgflow.run.window import Window
 

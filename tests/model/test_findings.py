@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from analysis import Analyse
-from ros_system import RosSystem
-from staged_events import Thread
+from support.analysis import Analyse
+from support.ros_system import RosSystem
+from support.staged_events import Thread
 
 
 def test_none_says_that_there_is_nothing(system: RosSystem, analyse: Analyse) -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from analysis import Analyse
-from ros_system import RosSystem
-from staged_events import Thread
-from thorough import thorough
+from support.analysis import Analyse
+from support.ros_system import RosSystem
+from support.staged_events import Thread
+from support.thorough import thorough
 
 HERE, THERE = Thread(100, cpu=0), Thread(100, cpu=1)
 RUNS = "SELECT start_ns, end_ns, is_loss_affected FROM callback_instance ORDER BY start_ns"

@@ -9,11 +9,11 @@ from __future__ import annotations
 from random import Random
 
 import pytest
-from analysis import Analysis
-from annotated_history import History, Publication, Run, reference
-from ros_system import RosSystem
-from staged_events import Thread
-from thorough import few
+from support.analysis import Analysis
+from support.annotated_history import History, Publication, Run, reference
+from support.ros_system import RosSystem
+from support.staged_events import Thread
+from support.thorough import few
 
 SUBSCRIPTIONS = (0x11, 0x12, 0x13)
 PUBLISHERS = (0x21, 0x22)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from analysis import Analyse, Analysis
-from ros_system import RosSystem
-from staged_events import Thread
+from support.analysis import Analyse, Analysis
+from support.ros_system import RosSystem
+from support.staged_events import Thread
 
 MS = 1_000_000
 GAPS = "SELECT kind, cpu, start_ns, end_ns, event_count FROM gap ORDER BY start_ns, cpu"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from analysis import Analyse, Analysis
-from ros_system import RosSystem
-from staged_events import Thread
+from support.analysis import Analyse, Analysis
+from support.ros_system import RosSystem
+from support.staged_events import Thread
 
 MAIN, FIRST, SECOND = Thread(100), Thread(100, 101), Thread(100, 102)
 EXECUTORS = (

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from random import Random
 
 import pytest
-from analysis import Analyse
-from ros_system import RosSystem
-from staged_events import Thread
-from thorough import few
+from support.analysis import Analyse
+from support.ros_system import RosSystem
+from support.staged_events import Thread
+from support.thorough import few
 
 TALKER = Thread(100)
 LISTENER = Thread(200)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from analysis import Analyse, Analysis
-from ros_system import RosSystem
-from staged_events import Thread
-from thorough import few
+from support.analysis import Analyse, Analysis
+from support.ros_system import RosSystem
+from support.staged_events import Thread
+from support.thorough import few
 
 from msgflow.db.finding import broken_rules
 

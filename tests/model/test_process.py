@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from analysis import Analyse
-from ros_system import RosSystem
-from staged_events import STEP_NS, Thread
-from thorough import thorough
+from support.analysis import Analyse
+from support.ros_system import RosSystem
+from support.staged_events import STEP_NS, Thread
+from support.thorough import thorough
 
 MAIN = Thread(100)
 LIVES = "SELECT pid, life, name, first_seen_ns, last_seen_ns FROM store.process ORDER BY process_id"

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import pyarrow as pa
 import pytest
-from analysis import Analyse
-from kernel_schedule import Kernel, call
-from ros_system import RosSystem
-from same_batches import read
-from staged_events import Thread
-from thorough import few
+from support.analysis import Analyse
+from support.kernel_schedule import Kernel, call
+from support.ros_system import RosSystem
+from support.same_batches import read
+from support.staged_events import Thread
+from support.thorough import few
 
 from msgflow.ingest import catalogue
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from analysis import Analyse
-from ros_system import WRITER, RosSystem
-from staged_events import STEP_NS, Thread
-from thorough import thorough
+from support.analysis import Analyse
+from support.ros_system import WRITER, RosSystem
+from support.staged_events import STEP_NS, Thread
+from support.thorough import thorough
 
 MAIN = Thread(100)
 LAYERS = (

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from analysis import Analyse
-from ros_system import RosSystem
-from staged_events import Thread
-from thorough import few, thorough
+from support.analysis import Analyse
+from support.ros_system import RosSystem
+from support.staged_events import Thread
+from support.thorough import few, thorough
 
 TALKER = Thread(100)
 LISTENER = Thread(100, 101)

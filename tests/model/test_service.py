@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from analysis import Analyse, Analysis
-from ros_system import RosSystem
-from staged_events import Thread
-from thorough import thorough
+from support.analysis import Analyse, Analysis
+from support.ros_system import RosSystem
+from support.staged_events import Thread
+from support.thorough import thorough
 
 CLIENT = Thread(100)
 SERVER = Thread(200, trace=1)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from analysis import Analyse
-from ros_system import RosSystem
-from staged_events import Thread
+from support.analysis import Analyse
+from support.ros_system import RosSystem
+from support.staged_events import Thread
 
 MAIN = Thread(100)
 CALLBACKS = (

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from analysis import Analyse
-from ros_system import WRITER, RosSystem
-from staged_events import STEP_NS, Thread
+from support.analysis import Analyse
+from support.ros_system import WRITER, RosSystem
+from support.staged_events import STEP_NS, Thread
 
 MAIN = Thread(100)
 MIDDLEWARE = Thread(100, 109, "dds.udp")

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from analysis import Analyse, Analysis
-from kernel_schedule import BLOCKED, HOG, KERNEL, MAIN, TIMER, Kernel, call, recorded
-from ros_system import RosSystem
-from staged_events import Thread
-from thorough import few
+from support.analysis import Analyse, Analysis
+from support.kernel_schedule import BLOCKED, HOG, KERNEL, MAIN, TIMER, Kernel, call, recorded
+from support.ros_system import RosSystem
+from support.staged_events import Thread
+from support.thorough import few
 
 STATES = "SELECT start_ns, end_ns, state, cpu FROM thread_state ORDER BY thread_id, start_ns"
 

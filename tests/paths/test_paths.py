@@ -8,7 +8,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from golden import fill_case
+from support.golden import fill_case
 
 from msgflow.database import Database
 from msgflow.errors import UsageError

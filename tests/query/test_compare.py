@@ -8,8 +8,8 @@ from typing import Any
 
 import duckdb
 import pytest
-from golden import BASE, FLOW, fill_case, insert
-from thorough import thorough
+from support.golden import BASE, FLOW, fill_case, insert
+from support.thorough import thorough
 
 import msgflow
 from msgflow.db.derivation import derive_table

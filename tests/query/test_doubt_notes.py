@@ -7,8 +7,8 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from golden import fill_case
-from thorough import few
+from support.golden import fill_case
+from support.thorough import few
 
 import msgflow
 from msgflow.db.finding import kinds_of, store_findings

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import golden
 import pytest
+from support import golden
 
 
 def test_an_empty_field_is_null_and_an_empty_text_is_not() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from thorough import few
+from support.thorough import few
 
 from msgflow.cli.options import one_text
 from msgflow.database import Database

@@ -8,8 +8,8 @@ from typing import Any
 
 import duckdb
 import pytest
-from golden import fill_case
-from thorough import few, thorough
+from support.golden import fill_case
+from support.thorough import few, thorough
 
 from msgflow.database import Database
 from msgflow.errors import QueryError, UsageError

@@ -8,7 +8,7 @@ from typing import Any
 
 import duckdb
 import pytest
-from golden import fill_case
+from support.golden import fill_case
 
 import msgflow
 from msgflow.db.finding import commands_after

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from lttng_program import daemons, lttng
 from recording.recorder import NotPossibleError, one_at_a_time, require, ros_environment
 from recording.tracetools import build_tracetools
+from support.lttng_program import daemons, lttng
 
 # `make` installs the wheels of ROS 2 there.
 ROS = Path(sys.prefix) / "ros" / "bin" / "python"

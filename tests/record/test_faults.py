@@ -13,7 +13,7 @@ from threading import Thread
 from typing import Any
 
 import pytest
-from lttng_program import free_port, lttng
+from support.lttng_program import free_port, lttng
 from watch_load import build_program
 
 from msgflow.database import Database

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from lttng_program import lttng
-from terminal import Terminal
+from support.lttng_program import lttng
+from support.terminal import Terminal
 from typer.testing import CliRunner, Result
 
 from msgflow.cli.app import app

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lttng_program import lttng
-from terminal import Terminal
+from support.lttng_program import lttng
+from support.terminal import Terminal
 
 PATH = "/camera → /image → /detector"
 Watch = Callable[..., subprocess.Popen[str]]

@@ -8,7 +8,7 @@ from pathlib import Path
 import duckdb
 import pyarrow as pa
 import pytest
-from thorough import few
+from support.thorough import few
 
 import msgflow.result.plain
 from msgflow.database import Database

@@ -8,8 +8,8 @@ from random import Random
 
 import pyarrow as pa
 import pytest
-from rules import derived
-from thorough import few
+from support.rules import derived
+from support.thorough import few
 
 TABLES = {
     "store.publisher": "run_id = 1, publisher_id, process_id = 1, node_id = 1, created_ns",

@@ -7,8 +7,8 @@ from math import sqrt
 
 import duckdb
 import pytest
-from rules import derived
-from thorough import few, thorough
+from support.rules import derived
+from support.thorough import few, thorough
 
 # A hundred values of side a, of side b all the same.
 STAGE = """

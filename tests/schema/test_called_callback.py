@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import duckdb
 import pytest
-from rules import modelled
+from support.rules import modelled
 
 STAGE = """
 CREATE SCHEMA staging;

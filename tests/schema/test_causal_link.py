@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import duckdb
 import pytest
-from rules import derived
+from support.rules import derived
 
 # What the rules of each kind of link say, and what they read beside it.
 TABLES = {

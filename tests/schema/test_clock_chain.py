@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import duckdb
 import pytest
-from rules import derived
+from support.rules import derived
 
 RULES = ("clock_drift_limit", "corrected_ns", "recorded_ns", "clock_sync")
 SECOND = 10**9

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import duckdb
 import pytest
-from rules import derived, insert
-from thorough import examples, few
+from support.rules import derived, insert
+from support.thorough import examples, few
 
 MS = 1_000_000
 # The input of the rules, without the views and tables that it comes from.

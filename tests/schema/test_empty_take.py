@@ -6,8 +6,8 @@ import random
 
 import duckdb
 import pytest
-from rules import derived
-from thorough import few
+from support.rules import derived
+from support.thorough import few
 
 TABLES = {
     "store.failed_take": "run_id, subscription_id, thread_id, failed_ns",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from rules import derived
+from support.rules import derived
 
 # Each process has a clock of its own. Process 1 publishes on /a; processes 1 and 2 subscribe to it.
 # From 100 on messages tell how far their clocks are apart. Process 3 has another topic. Process 4

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from golden import fill
+from support.golden import fill
 
 RUNS = 150
 DEPTH, PATHS = 3, 6

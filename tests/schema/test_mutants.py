@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from mutants import RULES, changes
-from thorough import thorough
+from support.thorough import thorough
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT = "schema/delivery/delivery_limit.sql"

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import duckdb
 import pytest
-from rules import insert
+from support.rules import insert
 
 MICROSECOND = 1_000
 MILLISECOND = 1_000_000

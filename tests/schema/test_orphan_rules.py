@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import duckdb
 import pytest
-from rules import derived
+from support.rules import derived
 
 MS = 1_000_000
 # One take of a message of /a; its publisher, process 1, is recorded from 100 to 900 ms.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import duckdb
 import pytest
-from rules import insert
+from support.rules import insert
 
 MILLISECOND = 1_000_000
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import duckdb
 import pytest
-from rules import derived
+from support.rules import derived
 
 # Process 1 is in trace 1, which lasts from 100 to 900.
 TABLES = {

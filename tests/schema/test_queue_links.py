@@ -7,8 +7,8 @@ from random import Random
 
 import duckdb
 import pytest
-from rules import derived
-from thorough import few
+from support.rules import derived
+from support.thorough import few
 
 TABLES = {
     "store.annotation": "run_id = 1, annotation_id = 1, kind = 'queue', queue_depth",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import duckdb
 import pytest
-from rules import insert
-from thorough import few
+from support.rules import insert
+from support.thorough import few
 
 SECOND = 1_000_000_000
 PERIOD = 10_000_000

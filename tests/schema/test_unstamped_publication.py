@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from rules import derived
+from support.rules import derived
 
 STAGE = """
 CREATE TABLE store.host AS SELECT 1 AS host_id, 1 AS clock_id;

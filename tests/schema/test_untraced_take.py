@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import duckdb
 import pytest
-from rules import modelled
+from support.rules import modelled
 
 # Thread 1 serves a message, waits, and runs what would be a timer; then it serves another message.
 # Callback 6 would be another timer, and is one unless takes are not traced.

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from thorough import few, thorough
+from support.thorough import few, thorough
 
 import msgflow
 from msgflow.db import migration

@@ -3,7 +3,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from header_rules import faults
+from support.header_rules import faults
 
 from msgflow.db.objects import completed
 from msgflow.db.store_table import store_tables

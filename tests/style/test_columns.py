@@ -5,9 +5,9 @@ from __future__ import annotations
 from itertools import combinations
 from pathlib import Path
 
-import golden
 import pytest
-from sql_files import SqlFile, sql_files
+from support import golden
+from support.sql_files import SqlFile, sql_files
 
 CASES = Path(__file__).resolve().parents[1] / "query" / "cases"
 QUERIES = [file for file in sql_files() if file.layer == "queries"]

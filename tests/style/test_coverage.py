@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
-from each import each
-from golden import SYSTEMS, read_case
-from sql_files import SqlFile, sql_files
+from support.each import each
+from support.golden import SYSTEMS, read_case
+from support.sql_files import SqlFile, sql_files
 
 from msgflow.db.store_table import table_views
 from msgflow.view.page_query import DIRECTORY, page_query

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from each import each
-from header_rules import faults
-from sql_files import LAYERS, SqlFile, sql_files, sql_paths
+from support.each import each
+from support.header_rules import faults
+from support.sql_files import LAYERS, SqlFile, sql_files, sql_paths
 
 import msgflow
 from msgflow.cli.operation import OWN

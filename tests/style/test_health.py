@@ -8,8 +8,8 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from each import each
-from sql_files import SqlFile, sql_files
+from support.each import each
+from support.sql_files import SqlFile, sql_files
 
 from msgflow.db.finding import SEVERITIES, kinds, kinds_of, phase_of, short_name
 from msgflow.sql.header import Header

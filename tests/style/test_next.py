@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 
 import typer
-from each import each
-from sql_files import SqlFile, sql_files
+from support.each import each
+from support.sql_files import SqlFile, sql_files
 
 from msgflow.cli.app import app
 from msgflow.db.store_table import store_tables

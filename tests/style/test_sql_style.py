@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 
-import pytest
-from each import each
-from sql_files import SqlFile, sql_files
-from sql_layout import fixed, sql_paths, wrong_lines
+from support.each import each
+from support.sql_files import SqlFile, sql_files
+from support.sql_layout import fixed, sql_paths, wrong_lines
 
 from msgflow.db.objects import VIEW_LAYERS
 

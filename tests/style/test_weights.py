@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from weigh import WEIGHTS
+from support.weigh import WEIGHTS
 
 FILE = Path(__file__).with_name("weights.toml")
 

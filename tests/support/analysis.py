@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import duckdb
-from parsed_once import parsing_once
-from staged_events import StagedEvents
 
 from msgflow.db import objects
 from msgflow.db.connection import attach
@@ -25,6 +23,8 @@ from msgflow.ingest import model, staging
 from msgflow.ingest.caret_initialisation import restore
 from msgflow.ingest.model import translate
 from msgflow.sql.header import Header
+from support.parsed_once import parsing_once
+from support.staged_events import StagedEvents
 
 _NAME = re.compile(r"(?:\b(staging|store|derive|main)\.)?\b([a-z_0-9]+)\b")
 _TEXT = re.compile(r"'([\w%]+)'")

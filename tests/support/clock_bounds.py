@@ -20,11 +20,11 @@ from random import Random
 from typing import TYPE_CHECKING
 
 import duckdb
-from possible_lines import Bound, PossibleLines
 
 from msgflow.ingest import ingest
 from msgflow_sim import simulate
 from msgflow_sim.scenario.traffic import traffic
+from support.possible_lines import Bound, PossibleLines
 
 if TYPE_CHECKING:
     from pathlib import Path

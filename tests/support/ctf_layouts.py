@@ -13,7 +13,7 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from bit_writer import BitWriter
+from support.bit_writer import BitWriter
 
 UUID = uuid.UUID("aaaaaaaa-bbbb-cccc-dddd-eeeeeeeeeeee")
 _TEXTS = (b"", b"a", b"node", b"/chatter", "Bücher".encode(), b"x" * 70, b"\xff\xfe", b"12345678")

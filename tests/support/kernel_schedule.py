@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ros_system import RosSystem
-from staged_events import Thread
+from support.ros_system import RosSystem
+from support.staged_events import Thread
 
 MAIN = Thread(100)
 KERNEL = 1

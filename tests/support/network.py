@@ -9,7 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from random import Random
 
-from kernel_traces import (
+from support.kernel_traces import (
     NOISE,
     RECEIVED,
     SENT,

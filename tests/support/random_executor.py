@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from random import Random
 
-from ros_system import RosSystem
-from staged_events import Thread
+from support.ros_system import RosSystem
+from support.staged_events import Thread
 
 CALLBACKS = 4
 SUBSCRIPTION, CALLBACK, PUBLISHER = 0x30, 0xC0, 0x10

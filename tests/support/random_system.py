@@ -9,8 +9,8 @@ from collections import deque
 from dataclasses import dataclass, field
 from random import Random
 
-from ros_system import RosSystem
-from staged_events import Thread
+from support.ros_system import RosSystem
+from support.staged_events import Thread
 
 TOPICS = ("/a", "/b", "/c")
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from staged_events import StagedEvents, Thread
+from support.staged_events import StagedEvents, Thread
 
 RMW = 0x1000
 WRITER = 0x2000

@@ -8,7 +8,7 @@ from typing import Any
 
 import pyarrow as pa
 import pytest
-from thorough import few
+from support.thorough import few
 
 import msgflow.trace
 from msgflow.errors import TraceError

@@ -10,7 +10,7 @@ from types import FrameType
 from typing import Any
 
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_trace
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
 from msgflow.errors import ExitCode, TraceError, UsageError

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_trace
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
 from msgflow.errors import ExitCode, TraceError

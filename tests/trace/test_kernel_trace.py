@@ -10,7 +10,7 @@ from typing import Any
 
 import pyarrow as pa
 import pytest
-from kernel_traces import (
+from support.kernel_traces import (
     FREQUENCY,
     ICMP,
     KHZ,
@@ -24,7 +24,7 @@ from kernel_traces import (
     KernelTrace,
     write_kernel_trace,
 )
-from same_batches import differences, read
+from support.same_batches import differences, read
 
 from msgflow.ingest import catalogue
 from msgflow.trace.ctf.record_batch import ClassPlan

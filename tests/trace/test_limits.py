@@ -7,7 +7,7 @@ import struct
 from pathlib import Path
 
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_trace
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
 
 import msgflow.trace
 from msgflow.trace import extraction, metadata_frame

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 from uuid import UUID
 
-from ctf_writer import Event, Packet, TraceContent, write_trace
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
 
 Read = Callable[..., dict[str, list[dict[str, Any]]]]
 

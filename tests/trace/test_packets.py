@@ -9,7 +9,7 @@ from typing import Any
 from uuid import uuid4
 
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_index, write_trace
+from support.ctf_writer import Event, Packet, TraceContent, write_index, write_trace
 
 from msgflow.trace import PACKET, TraceSet
 from msgflow.trace.columns import PACKET_SCHEMA

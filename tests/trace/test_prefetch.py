@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_trace
-from reading_threads import reading_threads
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
+from support.reading_threads import reading_threads
 
 import msgflow.trace
 from msgflow.trace.ctf import batches, event_order

@@ -9,7 +9,7 @@ from uuid import uuid4
 
 import pyarrow as pa
 import pytest
-from ctf_writer import CONTEXTS, Event, Packet, TraceContent, write_trace
+from support.ctf_writer import CONTEXTS, Event, Packet, TraceContent, write_trace
 
 from msgflow.errors import UsageError
 from msgflow.trace import PACKET, Progress, TraceSet

@@ -12,7 +12,7 @@ from typing import Any
 
 import pyarrow as pa
 import pytest
-from thorough import few, thorough
+from support.thorough import few, thorough
 
 import msgflow.trace
 from msgflow.ingest import catalogue

@@ -7,8 +7,8 @@ from functools import lru_cache
 from pathlib import Path
 
 import pytest
-from ingested import Ingested, made_once, open_ingested
-from thorough import SHOWN, few
+from support.ingested import Ingested, made_once, open_ingested
+from support.thorough import SHOWN, few
 
 from msgflow.ingest import ingest
 from msgflow_sim import scenarios, simulate

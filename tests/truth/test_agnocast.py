@@ -8,7 +8,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from thorough import thorough
+from support.thorough import thorough
 
 from msgflow.ingest import ingest
 from msgflow_sim import simulate

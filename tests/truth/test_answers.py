@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from ingested import Ingested, ingest_one
 from scoring import compare_simulated
-from thorough import few
+from support.ingested import Ingested, ingest_one
+from support.thorough import few
 
 from msgflow_sim import Buffers, Recording, simulate
 

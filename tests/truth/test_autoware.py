@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import autoware
 import pytest
+from support import autoware
 
 import msgflow
 from msgflow_sim import Simulation, simulate

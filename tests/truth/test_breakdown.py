@@ -8,8 +8,8 @@ from typing import Any
 
 import duckdb
 import pytest
-from ingested import Ingested
-from thorough import few
+from support.ingested import Ingested
+from support.thorough import few
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query

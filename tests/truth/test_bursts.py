@@ -6,9 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from ingested import ingest_one
 from scoring import compare_simulated
-from thorough import few, thorough
+from support.ingested import ingest_one
+from support.thorough import few, thorough
 
 from msgflow_sim import Recording, scenarios, simulate
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import duckdb
 import pytest
 from scoring import compare_simulated
-from thorough import few
+from support.thorough import few
 
 from msgflow.ingest import ingest
 from msgflow_sim import scenarios, simulate

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ingested import Ingested, ingest_one
-from thorough import few
+from support.ingested import Ingested, ingest_one
+from support.thorough import few
 
 RECORDED = ("pipeline", "mutex", "cond", "autoware", "nodump")
 

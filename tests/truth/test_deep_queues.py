@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ingested import ingest_one
 from scoring import compare_simulated
-from thorough import thorough
+from support.ingested import ingest_one
+from support.thorough import thorough
 
 from msgflow_sim import Host, Node, Process, Publisher, Scenario, Subscription, Timer, simulate
 from msgflow_sim.entity import MILLISECOND, SECOND, Work

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from ingested import Ingested, ingest_one
 from scoring import compare_simulated
-from thorough import few
+from support.ingested import Ingested, ingest_one
+from support.thorough import few
 
 from msgflow.db.finding import broken_rules
 from msgflow_sim import Recording, scenarios, simulate

@@ -9,7 +9,7 @@ from typing import Any
 
 import duckdb
 import pytest
-from ingested import Ingested
+from support.ingested import Ingested
 
 from msgflow.ingest import ingest
 from msgflow_sim import scenarios, simulate

@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import Any
 
 import pytest
-from ingested import Ingested, ingest_one
-from thorough import few
+from support.ingested import Ingested, ingest_one
+from support.thorough import few
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query

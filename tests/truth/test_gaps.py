@@ -6,9 +6,9 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from ingested import ingest_one
 from scoring import compare_simulated
-from thorough import few
+from support.ingested import ingest_one
+from support.thorough import few
 
 from msgflow_sim import Recording, simulate
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ingested import ingest_one
 from scoring import Score, compare_real, compare_simulated
-from thorough import few
+from support.ingested import ingest_one
+from support.thorough import few
 
 from msgflow.ingest import ingest
 from msgflow_sim import simulate

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ingested import ingest_one
-from thorough import few
+from support.ingested import ingest_one
+from support.thorough import few
 
 from msgflow_sim import Recording, simulate
 from msgflow_sim.entity import MILLISECOND

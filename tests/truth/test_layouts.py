@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ingested import Ingested, ingest_one
 from scoring import compare_simulated
-from thorough import few
+from support.ingested import Ingested, ingest_one
+from support.thorough import few
 
 from msgflow_sim import layouts, simulate
 

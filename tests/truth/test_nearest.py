@@ -9,8 +9,8 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from ingested import Ingested
-from thorough import few
+from support.ingested import Ingested
+from support.thorough import few
 
 from msgflow.db.connection import connect
 from msgflow.db.derivation import derive

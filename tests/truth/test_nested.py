@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from ingested import Ingested
+from support.ingested import Ingested
 
 
 @pytest.mark.thorough

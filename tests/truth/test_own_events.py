@@ -7,7 +7,7 @@ from pathlib import Path
 import duckdb
 import pytest
 from scoring import compare_simulated
-from thorough import thorough
+from support.thorough import thorough
 
 from msgflow.ingest import ingest
 from msgflow_sim import Recording, simulate

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import duckdb
 import pytest
-from ingested import Ingested
+from support.ingested import Ingested
 
 from msgflow.ingest import ingest
 from msgflow_sim import Buffers, Recording, simulate

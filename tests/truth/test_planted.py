@@ -11,7 +11,7 @@ import pytest
 from planted import is_named, missed
 from robot.problems import PROBLEMS
 from robot.simulated import robot
-from thorough import thorough
+from support.thorough import thorough
 
 from msgflow import Database
 from msgflow.ingest import ingest

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from recording.recorder import NotPossibleError, record, require, systems
 from scoring import Score, compare_real
-from thorough import few
+from support.thorough import few
 
 from msgflow.ingest import ingest
 

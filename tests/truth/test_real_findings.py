@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from fates import FATES
-from ingested import Ingested
-from thorough import few
+from support.fates import FATES
+from support.ingested import Ingested
+from support.thorough import few
 
 from msgflow.db.finding import broken_rules
 from msgflow.query.catalogue import load_query

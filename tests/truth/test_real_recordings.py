@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from ingested import Ingested, open_ingested
 from scoring import compare_real
-from thorough import few
+from support.ingested import Ingested, open_ingested
+from support.thorough import few
 
 from msgflow import open_db
 from msgflow.ingest import ingest

@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
-from ingested import Ingested
 from scoring import compare_recorded
-from thorough import few
+from support.ingested import Ingested
+from support.thorough import few
 
 Vertex = tuple[str, int]
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from ingested import ingest_one
 from scoring import Score, compare_simulated
-from thorough import few, thorough
+from support.ingested import ingest_one
+from support.thorough import few, thorough
 
 from msgflow_sim import Recording, Simulation, scenarios, simulate
 from msgflow_sim.entity import MILLISECOND, SECOND

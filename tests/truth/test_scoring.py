@@ -9,9 +9,9 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from ingested import ingest_one
 from scoring import compare, compare_recorded, compare_simulated
-from thorough import few, thorough
+from support.ingested import ingest_one
+from support.thorough import few, thorough
 
 from msgflow_sim import Recording, simulate
 

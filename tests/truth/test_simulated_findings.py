@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
-from ingested import Ingested
-from thorough import few
+from support.ingested import Ingested
+from support.thorough import few
 
 from msgflow import open_db
 

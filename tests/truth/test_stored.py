@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from ingested import Ingested
+from support.ingested import Ingested
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query

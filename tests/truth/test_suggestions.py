@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from suggestions import compare, merges
-from thorough import few
+from support.suggestions import compare, merges
+from support.thorough import few
 
 from msgflow_sim import simulate
 

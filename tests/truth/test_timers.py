@@ -10,7 +10,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
-from ingested import ingest_one
+from support.ingested import ingest_one
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query

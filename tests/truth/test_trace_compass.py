@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ingested import Ingested
+from support.ingested import Ingested
 
 from msgflow.db.connection import connect
 

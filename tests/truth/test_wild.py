@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from ingested import Ingested, made_once, open_ingested
 from scoring import compare_real, compare_recorded
+from support.ingested import Ingested, made_once, open_ingested
 
 from msgflow.ingest import ingest
 

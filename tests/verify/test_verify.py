@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 import duckdb
 import pytest
-from hostile import HOSTILE, renamed
-from thorough import few
+from support.hostile import HOSTILE, renamed
+from support.thorough import few
 
 from msgflow.database import Database
 from msgflow.errors import UsageError

@@ -12,10 +12,10 @@ from urllib.parse import urlsplit
 
 import duckdb
 import pytest
-import thorough
-from browser import ARGUMENTS, find_browser
-from ingested import made_once
-from served import Page, Served
+from support import thorough
+from support.browser import ARGUMENTS, find_browser
+from support.ingested import made_once
+from support.served import Page, Served
 
 from msgflow.database import open_db
 from msgflow.db.connection import connect

@@ -11,10 +11,10 @@ from typing import Any
 
 import duckdb
 import pytest
-from golden import SYSTEMS, fill_case
-from hostile import HOSTILE, renamed
-from served import Page, Served
-from thorough import few, thorough
+from support.golden import SYSTEMS, fill_case
+from support.hostile import HOSTILE, renamed
+from support.served import Page, Served
+from support.thorough import few, thorough
 
 from msgflow.cli.options import bytes_of
 from msgflow.database import open_db

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from served import Page, Served, a_publication, colors, flow_of, shown
-from thorough import few, thorough
+from support.served import Page, Served, a_publication, colors, flow_of, shown
+from support.thorough import few, thorough
 
 from msgflow.database import open_db
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from hostile import HOSTILE, renamed
-from served import Page, a_publication, colors, flow_of
-from thorough import few
+from support.hostile import HOSTILE, renamed
+from support.served import Page, a_publication, colors, flow_of
+from support.thorough import few
 
 from msgflow.database import open_db
 

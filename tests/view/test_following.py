@@ -7,7 +7,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from served import Page, colors
+from support.served import Page, colors
 
 from msgflow.cli.sql_process import WarmSql
 from msgflow.clocks.clocks_file import read_clock_sync

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from served import Page, Served
-from tables import decoded
+from support.served import Page, Served
+from support.tables import decoded
 
 from msgflow import Database
 from msgflow.database import open_db

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from served import Page, Served
+from support.served import Page, Served
 
 Serve = Callable[[Path], Served]
 _KINDS = "[...new Set(msgflow.page.renderer.lanes.map(lane => lane.kind))]"

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from ingested import made_once
-from served import Page, Served
-from thorough import few
+from support.ingested import made_once
+from support.served import Page, Served
+from support.thorough import few
 
 from msgflow.database import open_db
 from msgflow.ingest import ingest

@@ -10,8 +10,8 @@ from typing import Any
 
 import duckdb
 import pytest
-from tables import decoded
-from thorough import thorough
+from support.tables import decoded
+from support.thorough import thorough
 
 from msgflow.sql.statement import Statements
 from msgflow.view.page_query import DIRECTORY, Question, page_query, run_page_query

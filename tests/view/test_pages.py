@@ -8,8 +8,8 @@ from typing import Any
 
 import duckdb
 import pytest
-from served import Page, Served, shown
-from thorough import few, thorough
+from support.served import Page, Served, shown
+from support.thorough import few, thorough
 
 from msgflow.database import open_db
 from msgflow.text.values import format_cell

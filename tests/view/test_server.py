@@ -20,9 +20,9 @@ from typing import Any
 
 import duckdb
 import pytest
-from served import Served
-from tables import decoded
-from thorough import few
+from support.served import Served
+from support.tables import decoded
+from support.thorough import few
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app

@@ -17,11 +17,11 @@ from urllib.parse import quote, urlencode
 
 import duckdb
 import pytest
-from hostile import HOSTILE, renamed
-from processes import children_of, has_ended
-from served import Page, Served
-from tables import Decoded, decoded
-from thorough import thorough
+from support.hostile import HOSTILE, renamed
+from support.processes import children_of, has_ended
+from support.served import Page, Served
+from support.tables import Decoded, decoded
+from support.thorough import thorough
 
 from msgflow.database import open_db
 from msgflow.sql.header import read as read_header

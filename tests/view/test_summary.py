@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hostile import HOSTILE, renamed
-from served import Page, shown
-from thorough import few
+from support.hostile import HOSTILE, renamed
+from support.served import Page, shown
+from support.thorough import few
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app

@@ -8,8 +8,8 @@ import sys
 import pyarrow as pa
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tables import decoded
-from thorough import examples
+from support.tables import decoded
+from support.thorough import examples
 
 from msgflow.view.table_encoding import LARGEST_EXACT, encode
 

@@ -14,9 +14,9 @@ from typing import Any
 
 import duckdb
 import pytest
-from served import Page, Served, shown
-from tables import decoded
-from thorough import few, thorough
+from support.served import Page, Served, shown
+from support.tables import decoded
+from support.thorough import few, thorough
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app

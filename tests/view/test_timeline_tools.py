@@ -8,8 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from served import Page, Served, shown
-from thorough import thorough
+from support.served import Page, Served, shown
+from support.thorough import thorough
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from served import Served
-from tables import decoded
+from support.served import Served
+from support.tables import decoded
 
 from msgflow.db.sandbox import opening
 from msgflow.errors import DatabaseInUseError

@@ -15,8 +15,8 @@ from typing import Any
 
 import pyarrow as pa
 import pytest
-from same_windows import require_same_as_whole
-from thorough import few
+from support.same_windows import require_same_as_whole
+from support.thorough import few
 from typer.testing import CliRunner, Result
 
 from msgflow.cli.app import app

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import duckdb
 import pytest
-from thorough import thorough
+from support.thorough import thorough
 
 from msgflow.clocks.clocks_file import read_clock_sync
 from msgflow.database import Database

@@ -15,8 +15,8 @@ from unittest.mock import Mock
 
 import duckdb
 import pytest
-from same_windows import by_path, require_equal, require_same_as_whole
-from thorough import few, thorough
+from support.same_windows import by_path, require_equal, require_same_as_whole
+from support.thorough import few, thorough
 
 from msgflow.cli.show.watch_screen import window_line
 from msgflow.clocks.clocks_file import read_clock_sync

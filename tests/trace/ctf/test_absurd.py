@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_index, write_trace
-from same_batches import read
-from thorough import few
+from support.ctf_writer import Event, Packet, TraceContent, write_index, write_trace
+from support.same_batches import read
+from support.thorough import few
 
 import msgflow.trace
 from msgflow.errors import TraceError

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from ctf_writer import Event, Packet, TraceContent, write_index, write_trace
-from same_batches import Content, read
+from support.ctf_writer import Event, Packet, TraceContent, write_index, write_trace
+from support.same_batches import Content, read
 
 import msgflow.trace
 from msgflow.errors import TraceError

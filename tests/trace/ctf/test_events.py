@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ctf_layouts import Style, TraceMaker
-from ctf_writer import Event, Packet, TraceContent, write_trace
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mutations import flip_header, flip_stream, overwrite
-from same_batches import differences, read
-from thorough import examples
+from support.ctf_layouts import Style, TraceMaker
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
+from support.mutations import flip_header, flip_stream, overwrite
+from support.same_batches import differences, read
+from support.thorough import examples
 
 from msgflow.errors import TraceError
 from msgflow.trace.ctf import event_positions, stream_layout

@@ -8,12 +8,12 @@ from random import Random
 from typing import Any
 
 import pytest
-from ctf2_metadata import translate
-from ctf_layouts import Style, TraceMaker
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from same_batches import differences, read
-from thorough import examples, few
+from support.ctf2_metadata import translate
+from support.ctf_layouts import Style, TraceMaker
+from support.same_batches import differences, read
+from support.thorough import examples, few
 
 from msgflow.trace.ctf import batches
 

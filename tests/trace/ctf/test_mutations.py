@@ -10,12 +10,12 @@ from random import Random
 from typing import Any
 
 import pytest
-from ctf_layouts import Style, TraceMaker
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mutations import ANYWHERE, MUTATIONS, Mutation
-from same_batches import read
-from thorough import examples
+from support.ctf_layouts import Style, TraceMaker
+from support.mutations import ANYWHERE, MUTATIONS, Mutation
+from support.same_batches import read
+from support.thorough import examples
 
 from msgflow.errors import TraceError
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ctf2_metadata import translate
-from same_batches import differences, read
-from thorough import few
+from support.ctf2_metadata import translate
+from support.same_batches import differences, read
+from support.thorough import few
 
 from msgflow.ingest import catalogue
 from msgflow.trace import discover

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bit_writer import BitWriter
-from ctf_writer import Event, Packet, TraceContent, write_trace
-from same_batches import differences, read
-from thorough import few
+from support.bit_writer import BitWriter
+from support.ctf_writer import Event, Packet, TraceContent, write_trace
+from support.same_batches import differences, read
+from support.thorough import few
 
 from msgflow.trace import PACKET
 
