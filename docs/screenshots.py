@@ -19,7 +19,7 @@ from msgflow.database import Database, open_db
 from msgflow.ingest import ingest
 from msgflow_sim import simulate
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from support.browser import ARGUMENTS, find_browser
 
 IMAGES = Path(__file__).parent / "images"

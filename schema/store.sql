@@ -655,8 +655,7 @@ CREATE TABLE store.clock_uncertainty (
     uncertainty_ns BIGINT NOT NULL  -- Bound of the error of the correction at that moment [ns]
 );
 
--- One row per time between two steps of the clock that stamps messages, as far as it is certain how
--- it runs along a clock of the traces
+-- One row per time between two steps of the clock that stamps messages, where its course is certain
 CREATE TABLE store.stamp_clock (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     clock_id BIGINT NOT NULL,  -- Clock of the traces {to clock}

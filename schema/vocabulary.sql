@@ -129,7 +129,7 @@
 -- column: is_path BOOLEAN  The chain is a path, not only the beginning of some
 -- column: kind VARCHAR  'publication', 'take', 'callback_instance', 'request' or 'response'
 -- column: label VARCHAR  What it is: a topic or service, or what triggers the callback
--- column: label_group BIGINT  Group of runs
+-- column: label_group VARCHAR[]  Group of runs
 -- column: last_topic VARCHAR [topic]  Topic of the last message
 -- column: latency_ns BIGINT [ns]  From the start of the root to the end
 -- column: latest_ns BIGINT [epoch ns]  It was ready by then
@@ -180,7 +180,6 @@
 -- column: root_kind VARCHAR  'callback_instance', 'publication' or 'take'
 -- column: root_ns BIGINT [epoch ns]  Start of the root
 -- column: row_key BIGINT  Row of the timeline
--- column: run VARCHAR  Key of the run
 -- column: run_id BIGINT  Run
 -- column: running_p99_ns BIGINT [ns]  99 % of the CPU times are at most this
 -- column: runs BIGINT  Runs that have it
@@ -195,7 +194,6 @@
 -- column: sink_event VARCHAR  Event that ended the flow: to_event, or 'take' where the sink never
 --     shows a callback
 -- column: sink_ns BIGINT [epoch ns]  End of the flow
--- column: source VARCHAR  What it was read from
 -- column: start_at BIGINT [ns since origin]  Begin of the piece
 -- column: start_ns BIGINT [epoch ns]  Begin
 -- column: state VARCHAR  State of the thread, as in main.schedule_piece; NULL: not traced by the

@@ -187,11 +187,11 @@ class _Questions:
         # Of the flows that were read, as `compare` finds it.
         ((last_ns,),) = internal_sql().run(self.connection, "warm_up", {}).fetchall()
         if asked.start is None and last_ns is not None:
-            later = replace(
-                asked, start=f"{warm_up_seconds(last_ns - (self.run.start_ns or 0)):g}s"
-            )
+            start_ns = self.run.start_ns or 0
+            skipped = warm_up_seconds(last_ns - start_ns)
             # It ends with a step, which may lie behind all that was asked for or recorded.
-            if later.window([self.run]).start_ns < asked.window([self.run]).end_ns:
+            if start_ns + skipped * 1e9 < asked.window([self.run]).end_ns:
+                later = replace(asked, start=f"{skipped:g}s")
                 warm = self.ask(_FIRST, later, to=self.place)
                 if _has_flows(warm):
                     times, paths = later, warm

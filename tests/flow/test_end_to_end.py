@@ -297,10 +297,13 @@ def test_the_query(built: Analysis, chain: Chain, case: str, sinks: list[tuple[s
     assert row["pairs"] == len(latencies)
     assert (row["min_ns"], row["max_ns"]) == (latencies[0], latencies[-1])
     assert row["median_ns"] == latencies[(len(latencies) - 1) // 2]
-    assert row["reasons"] == (
-        "lost_in_transport 2, pending_at_end 2, before_discovery 1, callback_not_finished 1,"
-        " no_output 1"
-    )
+    assert dict(row["reasons"]) == {
+        "lost_in_transport": 2,
+        "pending_at_end": 2,
+        "before_discovery": 1,
+        "callback_not_finished": 1,
+        "no_output": 1,
+    }
 
 
 def graph(system: RosSystem, *edges: tuple[str | None, int, str], rounds: int = 1) -> None:

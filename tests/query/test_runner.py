@@ -13,7 +13,7 @@ from msgflow.query.runner import Steps, bind, run_query
 from msgflow.query.selection import make_selection
 from msgflow.run.slice import Slice
 from msgflow.sql.header import Header, parse
-from msgflow.sql.statement import RECORDED, recorded
+from msgflow.sql.statement import RECORDED, Statements, recorded
 from msgflow.sql.value import Value
 
 PARAMS = """\
@@ -566,9 +566,15 @@ def test_a_step_made_again_leaves_those_before_it(connection: duckdb.DuckDBPyCon
         assert topics("/a") == ["/a", "/b", "/c"]
 
 
-def test_a_step_is_made_of_what_is_known(connection: duckdb.DuckDBPyConnection) -> None:
-    known = {"example_message": "SELECT 1::BIGINT AS run_id, '/known' AS topic"}
-    with Steps(connection, known) as steps:
+def test_a_step_is_made_of_what_is_known(
+    connection: duckdb.DuckDBPyConnection, tmp_path: Path
+) -> None:
+    directory = tmp_path / "step"
+    directory.mkdir()
+    (directory / "example_message.sql").write_text(
+        "-- description: What is known.\nSELECT 1::BIGINT AS run_id, '/known' AS topic\n"
+    )
+    with Steps(connection, Statements(directory)) as steps:
         found = run_query(connection, header(STEPS), {}, Slice("first"), steps=steps)
     assert found.to_arrow()["topic"].to_pylist() == ["/known"]
 

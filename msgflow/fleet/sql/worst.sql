@@ -4,9 +4,12 @@
 -- grain: one row per flow
 -- param: path VARCHAR  The text of a path, a glob, or a part of it
 -- param: count BIGINT {1..} = 10  Most rows
--- column: latency_ns, name, run
+-- column: latency_ns, name
+-- column: run VARCHAR         Key of the run
 -- column: labels VARCHAR[]    Labels of the run, KEY=VALUE
--- column: root_ns, path, source, root_kind
+-- column: root_ns, path
+-- column: source VARCHAR      What it was read from
+-- column: root_kind
 -- column: root_id BIGINT      Identity of the root in the database of the run
 -- brief: latency_ns, name, labels, run, root_ns, source
 WITH fitting AS (

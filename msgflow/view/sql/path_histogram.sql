@@ -1,6 +1,5 @@
 -- description: How many flows of a path took how long, in bins of one width.
 -- grain: one row per bin with flows
--- reads: flow
 -- param: path
 -- param: bins BIGINT {1..2000} = 60  Number of bins
 -- param: begin_at, end_at

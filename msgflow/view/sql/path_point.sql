@@ -1,7 +1,6 @@
 -- description: Flows of a path one by one, or, where they are many, the slowest of each piece of
 --     time with the median of the piece.
 -- grain: one row per flow, or per piece of time with flows
--- reads: flow
 -- param: path
 -- param: limit BIGINT {1..50000} = 2000  Most rows
 -- param: begin_at, end_at

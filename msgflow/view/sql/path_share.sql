@@ -1,7 +1,6 @@
 -- description: The distribution of the latency of a path: latencies that occurred, such that a
 --     share of the flows took no longer.
 -- grain: one row per share
--- reads: flow
 -- param: path
 -- param: steps BIGINT {1..2000} = 200  Number of shares
 -- param: begin_at, end_at

@@ -1,6 +1,5 @@
 -- description: The slowest flows of a path, or of every path.
 -- grain: one row per flow
--- reads: flow
 -- param: path BIGINT = NULL  Number of the path; every one when NULL
 -- param: limit BIGINT {1..50000} = 10  Most flows of a path
 -- param: begin_at, end_at

@@ -1,6 +1,7 @@
 -- description: Which of the differences that messages agree with is the right one, from stretch
 --     to stretch: the nearest to that of the stretch before. The clocks of one machine begin
---     together. Where no drift leads from one to the next, the clock was set. A message is taken,
+--     together. Where no drift leads from one to the next, not even from the begin of one to the
+--     end of the other, the clock was set. A message is taken,
 --     and stamped, soon after it was published: if messages that were taken on this clock could as
 --     well be those of much later publications, the clock may have been set by a period.
 -- grain: one row per row of the course of a clock: stretch of time in which messages agree
@@ -55,7 +56,7 @@ followed AS (
                         > (r.end_ns - f.near.start_ns)::DOUBLE
                         * derive.clock_limit().drift_ppb / 1e9
                 },
-                abs(r.difference_ns - f.near.difference_ns)
+                (abs(r.difference_ns - f.near.difference_ns), r.difference_ns)
             ) AS near
         FROM followed AS f
         JOIN region AS r ON f.clock_id = r.clock_id AND f.number + 1 = r.number

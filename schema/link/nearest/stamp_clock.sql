@@ -3,7 +3,7 @@
 --     of that time alone. A line is certain in stretches of time that agree with it, between others
 --     that do: in a stretch beside a step, the clock may have been set already. What most stretches
 --     say is found first; then those that do not agree have lines of their own.
--- grain: one row per clock and time with one line; difference_ns is NULL where none is certain
+-- grain: one row per clock and time in which one line is certain
 -- when: derive.unstamped_call
 CREATE OR REPLACE MACRO derive.stamp_clock(only_run) AS TABLE
 WITH pair AS MATERIALIZED (FROM derive.stamp_pair(only_run)),

@@ -56,7 +56,10 @@ sampled AS (
 placed AS (
     SELECT
         s.clock_id, s.publisher_id, s.stretch, s.source_timestamp_ns, s.taken_ns,
-        s.earlier_timestamp_ns, p.position
+        s.earlier_timestamp_ns,
+        unnest(range(
+            p.position - derive.clock_limit().reach, p.position + derive.clock_limit().reach + 1
+        )) AS position
     FROM (
         SELECT
             *,
@@ -76,8 +79,7 @@ paired AS (
     FROM placed AS m
     JOIN published AS p
         ON m.publisher_id = p.publisher_id
-        AND p.position BETWEEN m.position - derive.clock_limit().reach
-            AND m.position + derive.clock_limit().reach
+        AND m.position = p.position
         AND p.written_ns <= coalesce(m.taken_ns, p.written_ns)
 )
 SELECT
