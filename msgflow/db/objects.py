@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING
 from msgflow.db.finding import composed
 from msgflow.db.store_table import store_file, store_tables, table_views
 from msgflow.files.resources import resource_directory
-from msgflow.sql.header import Header, read, vocabulary
+from msgflow.sql.header import Header, completed, read
 from msgflow.sql.quoting import identifier, literal
 from msgflow.version import __version__
 
@@ -53,19 +52,14 @@ def load(layer: str) -> tuple[Header, ...]:
         raise FileNotFoundError(directory)
     headers = [read(path) for path in directory.rglob("*.sql")]
     if layer == PUBLIC:
-        headers = [*map(completed, headers), *table_views()]
+        headers = [*map(_completed, headers), *table_views()]
     return sort([*headers, *composed(layer)])
 
 
-def completed(header: Header) -> Header:
+def _completed(header: Header) -> Header:
     """Fill in the columns that a header only names: of the table of its name, or the vocabulary."""
-    if all(column.type for column in header.columns):
-        return header
-    declared: dict[str, Column] = {column.name: column for column in vocabulary().columns}
-    if table := store_tables().get(header.name.partition(".")[2]):
-        declared |= table.columns
-    columns = (column if column.type else declared[column.name] for column in header.columns)
-    return replace(header, columns=tuple(columns))
+    table = store_tables().get(header.name.partition(".")[2])
+    return completed(header, table.columns if table else None)
 
 
 def sort(headers: Iterable[Header]) -> tuple[Header, ...]:

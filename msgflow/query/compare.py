@@ -23,7 +23,7 @@ from msgflow.run.choice import Run, choose_one, choose_runs, read_runs
 from msgflow.run.slice import Slice
 from msgflow.run.window import MAXIMUM_NS
 from msgflow.sql.failure import query_errors
-from msgflow.sql.header import read
+from msgflow.sql.header import completed, read
 from msgflow.sql.statement import internal_sql, registered
 
 if TYPE_CHECKING:
@@ -287,7 +287,7 @@ def _compared(
         require_places(connection, [run], {"from": asked["from"], "to": asked["to"]})
     with query_errors("the comparison", "the comparison failed: {}"):
         table = internal_sql().run(connection, "compare", asked).to_arrow_table()
-    header = read(resource_directory("schema") / "public" / "comparison.sql")
+    header = completed(read(resource_directory("schema") / "public" / "comparison.sql"))
     result = QueryResult(table, header, (first, second))
     if is_strict:
         result.notes.extend(_one_sided(result, what, [first], [second]))

@@ -84,7 +84,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -402,6 +402,13 @@ def _makers(folder: Path) -> Mapping[str, Path]:
 def vocabulary() -> Header:
     """Return the parameters and columns that several files mean alike."""
     return _declaring(resource_directory("schema") / "vocabulary.sql")
+
+
+def completed(header: Header, declared: Mapping[str, Column] | None = None) -> Header:
+    """Fill in the columns that a public file only names: as a table declares them, or as meant."""
+    known = {column.name: column for column in vocabulary().columns} | dict(declared or {})
+    columns = (column if column.type else known[column.name] for column in header.columns)
+    return replace(header, columns=tuple(columns))
 
 
 def _meaning(key: str, name: str, path: Path) -> Param | Column:

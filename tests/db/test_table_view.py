@@ -11,7 +11,7 @@ import pytest
 from msgflow.db import objects
 from msgflow.db.store_table import store_tables, table_views
 from msgflow.files.resources import resource_directory
-from msgflow.sql.header import parse
+from msgflow.sql.header import completed, parse
 
 VIEWS = table_views()
 AHEAD_NS = 1_000
@@ -147,4 +147,4 @@ def test_a_header_names_no_column_that_the_table_lacks() -> None:
     text = "-- description: Takes.\n-- column: taken_us\nSELECT 1\n"
     header = parse(text, resource_directory("schema") / "public" / "take.sql")
     with pytest.raises(KeyError, match="taken_us"):
-        objects.completed(header)
+        completed(header, store_tables()["take"].columns)

@@ -54,7 +54,8 @@ def connection() -> duckdb.DuckDBPyConnection:
     )
     con.execute("CREATE TABLE simulated_time (run_id BIGINT, at_ns BIGINT, simulated_ns BIGINT)")
     con.execute(
-        "CREATE TABLE finding (run_id BIGINT, name VARCHAR, subject VARCHAR, detail VARCHAR)"
+        "CREATE TABLE finding (run_id BIGINT, name VARCHAR, layer VARCHAR, subject VARCHAR, "
+        "detail VARCHAR)"
     )
     con.execute("CREATE TABLE thread_state (run_id BIGINT)")
     con.execute("CREATE TABLE stack_sample (run_id BIGINT)")
@@ -389,7 +390,7 @@ def test_a_layer_that_was_not_traced_is_the_reason_for_no_rows(
         "INSERT INTO finding BY NAME SELECT * FROM (VALUES "
         "(1, 'missing_layer', 'requests', 'no request'), (2, 'missing_layer', 'requests', 'none'), "
         "(1, 'missing_layer', 'goals', 'no goal'), (1, 'started_late', 'requests', 'late')) "
-        "AS t (run_id, name, subject, detail)"
+        "AS t (run_id, name, layer, detail)"
     )
     connection.execute("CREATE TABLE clock AS SELECT 1 AS run_id")
 
@@ -402,7 +403,7 @@ def test_a_layer_that_was_not_traced_is_the_reason_for_no_rows(
     assert notes("all", layer="goals") == ["run first (1): no goal"]
     assert notes("all") == ["run first (1): no request", "run second (2): none"]
     assert "no request" not in notes("first", None)
-    connection.execute("DELETE FROM finding WHERE subject = 'requests'")
+    connection.execute("DELETE FROM finding WHERE layer = 'requests'")
     assert notes("first") == ["nothing fits --where 'start_ns < 0': try with less"]
 
 
