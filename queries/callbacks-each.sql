@@ -20,7 +20,7 @@
 -- column: is_loss_affected BOOLEAN  A gap of the trace may hide its end or what it did
 -- column: callback_instance_id BIGINT  Identity of the callback instance:
 --     msgflow flow --callback-instance
--- column: callback_id BIGINT        Identity of the callback
+-- column: callback_id
 -- column: is_internal
 -- brief: duration_ns (slowest), node, callback, start_ns, take_id, published, running_ns,
 --     preempted_ns, tid, callback_instance_id, process, host

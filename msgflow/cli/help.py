@@ -1,7 +1,7 @@
 """The help of a command, as text: what it does, its arguments, and its options in groups.
 
-Typer lays help out with Rich, of which it loads Markdown, highlighting and tracebacks: that takes
-longer than all the rest of `msgflow --help`.
+Typer lays help out with Rich, and loads its Markdown, highlighting and tracebacks for that: this
+takes longer than all the rest of `msgflow --help`.
 """
 
 from __future__ import annotations

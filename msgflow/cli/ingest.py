@@ -61,7 +61,7 @@ def command(
     with noted_interrupts():
         from msgflow.cli.progress import ingest_progress
         from msgflow.database import Database
-        from msgflow.db.finding import next_command
+        from msgflow.db.finding import first_command
         from msgflow.ingest.recordings import Recording, find_recordings
 
         if name is not None:
@@ -111,11 +111,12 @@ def command(
             if not quiet:
                 _note_archives(traces, database)
                 findings = [each for report in reports for each in report.findings]
-                words = next_command(findings).split()
-                # Of several runs, `why` explains one.
-                several = words if words[-1] == "check" else ["msgflow", "query", "e2e-latency"]
+                words = first_command(findings)
                 is_one = len(reports) == 1
-                print_next(words if is_one else several, database, None if is_one else "all")
+                # Of several runs, `why` explains one.
+                if not is_one and words == ("why",):
+                    words = ("query", "e2e-latency")
+                print_next(["msgflow", *words], database, None if is_one else "all")
 
 
 def _note_archives(traces: list[str], database: Path) -> None:
@@ -141,10 +142,7 @@ def _print_report(report: IngestReport, database: Path) -> None:
     for name, group in groupby(notable, key=lambda finding: finding.name):
         places = list(group)
         for finding in places[:PLACES_SHOWN]:
-            # The view calls it so where there is neither a trace nor a place.
-            is_whole = finding.subject == f"the {finding.phase}"
-            place = "" if is_whole else f"{finding.subject} — "
-            print_note(f"{name} ({finding.count}): {place}{finding.detail}")
+            print_note(f"{name} ({finding.count}): {finding.subject} — {finding.detail}")
         if len(places) > PLACES_SHOWN:
             print_note(f"{name}: {len(places) - PLACES_SHOWN} more places: msgflow check")
 

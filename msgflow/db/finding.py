@@ -191,10 +191,10 @@ def read_findings(
     return sorted((each for each in findings if info or each.severity != "info"), key=_order)
 
 
-def next_command(findings: Sequence[Finding]) -> str:
+def first_command(findings: Sequence[Finding]) -> tuple[str, ...]:
     """Return the command that comes next: first for what is wrong, then for what is late."""
     is_sound = all(finding.severity == "info" for finding in findings)
-    return "msgflow why" if is_sound else "msgflow check"
+    return ("why",) if is_sound else ("check",)
 
 
 def commands_after(findings: Sequence[Finding]) -> list[tuple[str, ...]]:

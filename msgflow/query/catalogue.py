@@ -49,7 +49,7 @@ def query_names() -> tuple[str, ...]:
 
 
 def _base(name: str) -> str | None:
-    """Return the query of which this is a variant; None if it is none."""
+    """Return the query that this is a variant of, else None."""
     return next((other for other in _files() if name.startswith(f"{other}-")), None)
 
 

@@ -53,9 +53,9 @@ folder are in stands before. Only what others put in front of theirs says its ki
   stands in the file of the same name with `-age` behind it; a BOOLEAN `each`, in that with `-each`.
   A query may have several: each value of them is one file.
 
-A `param` or `column` may be a list of names, whose meaning stands elsewhere: in the query of which
-this file is a variant (NAME-variant.sql, or NAME.sql of a lake), for a public view in the table of
-the same name, else in `schema/vocabulary.sql`. There stands what several files mean alike. A file
+A `param` or `column` may be a list of names, whose meaning stands elsewhere: for a variant in its
+query (NAME-variant.sql, or NAME.sql of a lake), for a public view in the table of the same name,
+else in `schema/vocabulary.sql`. There stands what several files mean alike. A file
 in which a word means something else declares it itself.
 
 The unit of a column may also say what the column names: 'node', 'topic', 'callback', 'host' or
@@ -425,7 +425,7 @@ def _meaning(key: str, name: str, path: Path) -> Param | Column:
 
 
 def _base(path: Path) -> Path | None:
-    """Return the query of which a file is a variant, or which it asks of a lake."""
+    """Return the query that a file is a variant of, or that it asks of a lake."""
     queries, name = resource_directory("queries"), path.stem.replace("_", "-")
     if path.parent == queries:
         name = name.rpartition("-")[0]

@@ -1,6 +1,5 @@
--- description: The number of the tenth of a second that a moment is in (of nanoseconds, with digits
---     in groups of three). Where only a few messages are asked for, what is in the same tenth is
---     read one by one. Everywhere else one row stands for all of a tenth. Its length changes no
---     answer. It only decides how many rows are left: a recording has far fewer tenths of a second
---     than messages, and each has few.
+-- description: The number of the tenth of a second in which a moment lies (of nanoseconds, with
+--     digits in groups of three). In tenths with a message that is asked for, each event is read;
+--     any other tenth has one row in place of all its events. Another length would change no
+--     answer, only how many rows are left.
 CREATE OR REPLACE MACRO derive.tenth_of_second(at_ns) AS at_ns // 100_000_000

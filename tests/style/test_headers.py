@@ -295,7 +295,7 @@ def terms(header: Header) -> Iterator[tuple[str, str]]:
 
 
 def family(header: Header) -> str:
-    """Return the query of which a file is a variant, or which it asks of a lake; else its path."""
+    """Return the query that a file is a variant of, or that it asks of a lake; else its path."""
     name = header.path.stem.replace("_", "-")
     queries = (query for query in query_names() if f"{name}-".startswith(f"{query}-"))
     return next(queries, str(header.path))

@@ -41,7 +41,7 @@ SELECT
     n.run_id, i.node_id, i.topic_name,
     i.number AS count,
     printf(
-        '%s on %s end at %s, which publishes %s: msgflow suggest links',
+        '%s on %s end at %s, which publishes %s',
         derive.counted(i.number, 'message'), i.topic_name,
         main.node_label(n.full_name, p.name, p.pid), o.published
     ) AS detail

@@ -1,6 +1,7 @@
--- description: Callback instances with their callback object, by the event that made it, else by
---     its first instance, and the take or the request that
---     they were called with. The callback_start directly follows the take's last layer, or the
+-- description: Callback instances, with their callback object, and the take or the request that
+--     they were called with. The object is known by the event that made it, else by its first
+--     instance.
+--     The callback_start directly follows the take's last layer, or the
 --     rmw_take_request, on its thread, with no event of the executor between the two. Neither an
 --     rmw take nor a request is for an intra-process call, nor is a dequeue for another one. The
 --     subscriptions, or services, agree where both are known. What goes on for something earlier

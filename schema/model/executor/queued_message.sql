@@ -4,8 +4,9 @@
 --     thread ran its first callback is left out: an executor does not get that in order.
 --     `is_in_order`: the thread serves what came first first, as events executors do: of two
 --     messages of two subscriptions that both waited, the older one was always taken first, in both
---     orders of the subscriptions. A wait set has one order of subscriptions: of 24 real executors
---     with such pairs, those with ten had taken the younger one first in a tenth to half of them. A
+--     orders of the subscriptions. A wait set has one order of subscriptions. Of 24 real executors
+--     with a wait set, each that had ten such pairs took the younger one first in a tenth to half
+--     of them. A
 --     message may come later than one that was published up to a millisecond later, unless the
 --     thread itself published both.
 -- grain: one row per such take

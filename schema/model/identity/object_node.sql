@@ -1,6 +1,7 @@
 -- description: The node of each object, by the event that initialised the object: the latest
---     initialisation of its node handle before it. Any later one is better than none; where there
---     is none, the node is known by its first object (`is_inferred`). A publisher may be created
+--     initialisation of its node handle before it. Any later one is better than
+--     nothing. A node that was never initialised is known by its first object (`is_inferred`). A
+--     publisher may be created
 --     inside its node, right before the node's own event: before Jazzy /rosout is. It belongs to
 --     the one right after. Where a node handle is used again, what came first on the handle tells
 --     the two orders apart.

@@ -1,5 +1,5 @@
--- description: Requests and responses both ends of which were traced, at the client and at the
---     service: by the client's GID, its number of the request and, of a response, the stamp;
+-- description: Requests and responses that were traced at both ends, the client and the service:
+--     by the client's GID, its number of the request and, of a response, the stamp;
 --     without a stamp on one of the sides, where only one comes into question. Of equal responses
 --     the k-th sent is the k-th taken. Every service of the name may take a request. Where a number
 --     was sent or taken twice, nothing tells the requests apart, and none has its other end.

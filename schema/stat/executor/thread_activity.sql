@@ -1,6 +1,6 @@
 -- description: What executor threads did, in detail (main.executor_activity), by the clock of their
 --     executor: all activities that reach into a window. A few around it may be there as well, and
---     the end of those behind it is not known.
+--     all of events executors; the end of those behind it is not known.
 -- grain: one row per interval of a thread in which nothing changed
 -- param: runs BIGINT[]  Runs to look at; NULL: all
 -- param: window_start_ns BIGINT  Begin of the window, epoch ns; NULL: from the first event
