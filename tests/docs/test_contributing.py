@@ -8,6 +8,8 @@ from pathlib import Path
 import duckdb
 import pytest
 from support.golden import fill_case
+from support.header_rules import faults
+from support.sql_layout import wrong_lines
 
 from msgflow.sql.header import parse
 
@@ -53,7 +55,10 @@ def written(path: str) -> str:
 def test_the_query_and_the_golden_case_of_the_first_change_work(
     fresh_database: Path, tmp_path: Path
 ) -> None:
-    header = parse(written("queries/node-timers.sql"), ROOT / "CONTRIBUTING.md")
+    text = written("queries/node-timers.sql")
+    header = parse(text, ROOT / "queries" / "node-timers.sql")
+    assert list(faults(text, header)) == []
+    assert list(wrong_lines(text)) == []
     case = tmp_path / "two_timers.case"
     case.write_text(written("tests/query/cases/node-timers/two_timers.case"))
     with duckdb.connect(str(fresh_database)) as con:
