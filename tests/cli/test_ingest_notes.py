@@ -45,7 +45,7 @@ def test_errors_and_warnings_are_printed_and_many_places_are_cut(
     lines = said.splitlines()
     assert [line for line in lines if line.startswith("note: ")] == [
         "note: lost_packets (3): robot/ust — numbers",
-        "note: ignored_nothing (1): numbers",
+        "note: ignored_nothing (1): the input — numbers",
         *(f"note: started_late ({n}): node {n} on robot — numbers" for n in range(10)),
         "note: started_late: 2 more places: msgflow check",
     ]

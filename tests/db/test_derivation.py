@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from graphlib import CycleError
 from pathlib import Path
 
@@ -74,7 +75,7 @@ def test_the_hash_follows_the_rules_that_are_stored(monkeypatch: pytest.MonkeyPa
         with monkeypatch.context() as patched:
             for name, headers in whole.items():
                 given = [
-                    objects.replace(one, **(fields or {"body": f"{one.body} -- changed"}))
+                    replace(one, **(fields or {"body": f"{one.body} -- changed"}))
                     if one.name == changed
                     else one
                     for one in headers

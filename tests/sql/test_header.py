@@ -5,11 +5,10 @@ from pathlib import Path
 import pytest
 from support.header_rules import faults
 
-from msgflow.db.objects import completed
 from msgflow.db.store_table import store_tables
 from msgflow.files.resources import resource_directory
 from msgflow.query.catalogue import load_query
-from msgflow.sql.header import Column, Header, HeaderError, Param, parse, vocabulary
+from msgflow.sql.header import Column, Header, HeaderError, Param, completed, parse, vocabulary
 
 PATH = Path("queries/example.sql")
 
@@ -170,7 +169,7 @@ def test_the_table_declares_the_columns_of_a_public_view() -> None:
     text = "-- description: x\n-- column: run_id, path_id\nSELECT 1\n"
     header = parse(text, resource_directory("schema") / "public" / "callback.sql")
     assert header.columns == (Column("run_id", "", None, ""), Column("path_id", "", None, ""))
-    (run_id, path_id) = completed(header).columns
+    (run_id, path_id) = completed(header, store_tables()["callback"].columns).columns
     assert run_id == store_tables()["callback"].columns["run_id"]
     assert path_id.description.startswith("Path, as main.flow_path")
 

@@ -15,7 +15,10 @@ Row = dict[str, Any]
 
 def by_path(rows: Sequence[Row]) -> dict[str, Row]:
     """Return the rows of paths with roots: others say that nothing happened."""
-    return {row["path"]: row for row in rows if row["roots"]}
+    # Arrow has the entries of a map as a list, JSON as an object.
+    return {
+        row["path"]: row | {"reasons": dict(row["reasons"] or {})} for row in rows if row["roots"]
+    }
 
 
 def require_equal(database: Database, report: WindowReport) -> None:
