@@ -264,7 +264,7 @@ def test_of_two_shards_with_the_same_packets_one_has_the_run(
     record("z", "first")
     Path("night.csv").write_text("path,robot\na,A\nz,Z\n")
     first, second = ("az"[n] for n in order)
-    # A restart changes nothing, of whichever shard.
+    # A restart of any shard changes nothing.
     for shard in (*order, *order, *reversed(order)):
         fleet_ingest(["night.csv"], "lake", options=Options(database=False), shard=(shard, 2))
     assert runs() == {"first": first}
