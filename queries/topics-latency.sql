@@ -1,7 +1,7 @@
 -- title: Latency from publication to take by topic and subscription
 -- description: How long messages took from the end of their publication to their take. That
---     includes the time for which the receiving executor was busy with other callbacks, given as
---     bounds, those of waits; the rest was the network or an idle executor. A negative latency
+--     includes the time for which the receiving executor was busy with other callbacks, as bounds,
+--     as in the query waits; the rest was the network or an idle executor. A negative latency
 --     means that the clocks of two hosts are apart. Takes without a known publication are counted,
 --     but not measured, and neither are messages that were stored until their subscription existed.
 -- grain: one row per topic, receiving node and subscription
@@ -27,7 +27,7 @@
 WITH received AS (
     SELECT
         t.run_id, t.subscription_id, l.publication_id, l.candidate_count, l.latency_ns, l.stored_ns,
-        -- Between clocks that are apart the time that they show may be shorter.
+        -- Clocks that are apart may show less than the wait.
         least(coalesce(w.busy_min_ns, 0), greatest(l.latency_ns, 0)) AS busy_min_ns,
         least(coalesce(w.busy_max_ns, l.latency_ns), greatest(l.latency_ns, 0)) AS busy_max_ns
     FROM main.take AS t

@@ -20,8 +20,8 @@ _MOST_DEFAULT_BYTES = 4_000_000_000
 _LEAST_BYTES = 15_000_000
 # DuckDB advises this. With less for each, threads spill more than fewer threads would.
 _BYTES_PER_THREAD = 125_000_000
-# What functions, results and heaps in pieces may take for each byte that DuckDB counts, and at
-# least. DuckDB's own limit is 80 % of the memory that there is.
+# What functions, results and fragmented heaps may take for each byte that DuckDB counts, and at
+# least.
 _SHARE_BESIDE = 0.25
 _LEAST_BESIDE = 1 << 28
 _EXAMPLE = "MSGFLOW_MEMORY_LIMIT=2GB"
@@ -66,12 +66,13 @@ def limit_threads(con: duckdb.DuckDBPyConnection) -> None:
 def bound_process(con: duckdb.DuckDBPyConnection) -> None:
     """Bound the memory of this process by the memory limit of its connection.
 
-    It may take the limit besides what it has now, and a quarter of that, at least 256 MiB, for what
-    DuckDB does not count. A system without /proc knows no such bound.
+    It may take the limit besides what it has now, and a quarter of the limit, at least 256 MiB, for
+    what DuckDB does not count. A system without /proc knows no such bound.
     """
     con.execute("SELECT 1").fetchall()  # its threads have their stacks now
     limit = _limit_bytes(con)
     with contextlib.suppress(OSError), open("/proc/self/statm", encoding="ascii") as file:
+        # Data and stack, in pages.
         used = int(file.read().split()[5]) * resource.getpagesize()
         most = used + limit + max(round(limit * _SHARE_BESIDE), _LEAST_BESIDE)
         bound(resource.RLIMIT_DATA, most)

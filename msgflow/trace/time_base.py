@@ -31,8 +31,9 @@ def on_one_base(
 
     The first trace of programs decides, the kernel's only where there is no other: a kernel trace
     beside a recording moves no time of it. Only a clock that has a uuid and counts nanoseconds is
-    corrected: without a uuid it is a clock of its own. So is the clock of a hostname that recorded
-    at the time of the first one, but on one base would not have: it loses its uuid.
+    corrected: without a uuid it is a clock of its own. Two hostnames with one boot id that overlap
+    as recorded, but not after the correction, are two machines (a clone): the clock that would be
+    corrected loses its uuid.
 
     `offsets` are what traces opened before decided, in ns since the epoch. The function adds those
     of these traces.

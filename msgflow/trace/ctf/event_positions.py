@@ -100,7 +100,8 @@ def guess(layout: StreamLayout, memory: Memory, targets: Integers) -> tuple[Inte
     """Return where events seem to begin behind some bytes, and behind which of them each is.
 
     From any byte, the sizes of events soon lead to the begin of an event, and from there to begins
-    only; bytes that lead to no event are none. So most that get far enough meet.
+    only; bytes that lead to no event are left out. So most of those that get far enough meet: the
+    median of the places where they arrive is where most are.
     """
     offsets = np.arange(0, LOOKED_AT, layout.known_header.align)
     at = (targets[:, np.newaxis] + offsets).reshape(-1)

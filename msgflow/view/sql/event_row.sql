@@ -3,7 +3,7 @@
 -- grain: one row per row of the timeline
 -- kind: inline
 -- column: run_id
--- column: row_key BIGINT  Identity of the row: -4 times that of its first event
+-- column: row_key BIGINT  Identity of the row: -4 times that of its first event, as in row
 -- column: process_id BIGINT  Identity of the process
 -- column: node_id BIGINT  Identity of the node; NULL: none, or not known
 -- column: name VARCHAR  Provider and event

@@ -13,6 +13,7 @@ WITH by_hand AS (
         start_event_id AS event_id,
         take_id, subscription_id, taken_ns
     FROM derive.take_by_hand(only_run) AS t
+    -- Processes whose Python is traced: only that tracer records executors of rclpy.
     ANTI JOIN (
         SELECT p.process_id
         FROM store.process AS p

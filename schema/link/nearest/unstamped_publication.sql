@@ -4,7 +4,8 @@ CREATE OR REPLACE MACRO derive.unstamped_publication(only_run) AS TABLE
 SELECT
     b.run_id, h.clock_id, p.topic_name, b.publisher_id, b.thread_id, b.publication_id, b.written_ns,
     b.next_event_ns, b.is_without_event,
-    -- While it was not seen, the thread may have gone on earlier, and published more.
+    -- Its next event is seen behind a break of its record: it may have gone on earlier, and
+    -- published more.
     coalesce(k.resumed_ns <= b.next_event_ns, false) AS has_break
 FROM derive.unstamped_call(only_run) AS b
 JOIN store.publisher AS p ON b.publisher_id = p.publisher_id

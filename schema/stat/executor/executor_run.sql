@@ -1,7 +1,6 @@
 -- description: The callback instances that occupied threads of executors, numbered on each thread
 --     in order of time. Callback instances nested in others are part of those. So the rows of one
---     thread never overlap, and the sum over any stretch of time takes only two look-ups. Times are
---     those of the executor's clock.
+--     thread never overlap. Times are those of the executor's clock.
 -- grain: one row per callback instance that is not nested in another
 SELECT
     i.run_id, x.executor_id, i.thread_id, i.callback_id, i.callback_instance_id, i.start_ns,
