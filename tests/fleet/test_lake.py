@@ -243,10 +243,10 @@ def test_a_file_appears_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     assert store.read("a/b") is None
 
 
-def aged(lake: Lake) -> None:
-    """Let all files be two days old."""
+def aged(lake: Lake, hours: int = 25) -> None:
+    """Let all files be so old."""
     for entry in lake.store.entries():
-        os.utime(lake.store.full(entry.path), ns=(0, time.time_ns() - 2 * 86_400 * 10**9))
+        os.utime(lake.store.full(entry.path), ns=(0, time.time_ns() - hours * 3_600 * 10**9))
 
 
 def test_what_no_run_needs_is_deleted(
@@ -262,7 +262,8 @@ def test_what_no_run_needs_is_deleted(
     for file in (*unfinished, kept[0]):
         shutil.copy(lake.store.full(part_path("flow", first["part"])), file)
     before, files = content(lake), paths(lake, "")
-    # Another process may be about to commit what is new.
+    # Another process may be about to commit what is less than a day old.
+    aged(lake, hours=23)
     assert lake.clean_up() == (0, 0)
     assert paths(lake, "") == files
     aged(lake)
