@@ -6,4 +6,4 @@ SELECT run_id
 FROM store.executor_state
 WHERE state IN ('wait', 'process')
 GROUP BY run_id
-HAVING count(DISTINCT state) = 2
+HAVING min(state) <> max(state)

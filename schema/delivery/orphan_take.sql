@@ -18,11 +18,13 @@ CREATE OR REPLACE MACRO derive.orphan_take(
 ) AS TABLE
 WITH orphan AS MATERIALIZED (
     SELECT
-        t.take_id, t.subscription_id, t.process_id, t.method, t.taken_ns, t.is_loss_affected,
+        t.take_id, t.subscription_id, t.process_id, p.host_id, t.method, t.taken_ns,
+        t.is_loss_affected,
         t.source_timestamp_ns AS stamp_ns,
         s.topic_name, s.created_ns
     FROM derive.unlinked_take(only_run) AS u
     JOIN store.take AS t ON u.take_id = t.take_id
+    JOIN store.process AS p ON t.process_id = p.process_id
     LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
 ),
 presence AS MATERIALIZED (
@@ -31,18 +33,12 @@ presence AS MATERIALIZED (
         min(begin_ns) AS begin_ns,
         min(recorded_from_ns) AS recorded_from_ns
     FROM derive.process_presence
-    WHERE run_id = only_run AND EXISTS (SELECT 1 FROM orphan)
+    WHERE run_id = only_run
     GROUP BY process_id
 ),
 gap AS MATERIALIZED (
     SELECT process_id, start_ns, covered_until_ns
     FROM derive.process_gap(only_run, has_gaps, has_pauses)
-    WHERE EXISTS (SELECT 1 FROM orphan)
-),
-run_begin AS (
-    SELECT min(start_ns) AS begin_ns
-    FROM store.trace
-    WHERE run_id = only_run AND domain IS DISTINCT FROM 'kernel'
 ),
 stampless AS (
     SELECT process_id
@@ -56,7 +52,7 @@ channelled AS (
     SELECT DISTINCT p.topic_name, b.process_id
     FROM derive.unstamped_call(only_run) AS b
     JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
-    WHERE b.is_without_event AND EXISTS (SELECT 1 FROM orphan)
+    WHERE b.is_without_event
 ),
 -- Before Humble takes have no event of their own, and before Iron what leaves a ring buffer has
 -- none: that they have no stamp is not due to loss.
@@ -67,20 +63,16 @@ showing AS (
         bool_or(t.method = 'ring_buffer') AS has_buffers
     FROM store.take AS t
     JOIN store.process AS p ON t.process_id = p.process_id
-    WHERE t.run_id = only_run AND EXISTS (SELECT 1 FROM orphan WHERE stamp_ns IS NULL)
+    WHERE t.run_id = only_run
     GROUP BY p.host_id
 ),
 stampable AS (
     SELECT o.take_id
-    FROM (
-        SELECT take_id, process_id
-        FROM orphan
-        WHERE stamp_ns IS NULL AND method <> 'ring_buffer' AND is_loss_affected
-    ) AS o
-    JOIN store.process AS p ON o.process_id = p.process_id
-    JOIN showing AS h ON p.host_id = h.host_id
+    FROM orphan AS o
+    JOIN showing AS h ON o.host_id = h.host_id
     LEFT JOIN store.callback_instance AS c ON o.take_id = c.take_id
-    WHERE CASE WHEN c.is_intra_process THEN h.has_buffers ELSE h.has_stamps END
+    WHERE o.stamp_ns IS NULL AND o.method <> 'ring_buffer' AND o.is_loss_affected
+        AND CASE WHEN c.is_intra_process THEN h.has_buffers ELSE h.has_stamps END
 ),
 -- Publications whose topic and message are not known.
 nameless AS (
@@ -88,7 +80,6 @@ nameless AS (
     FROM store.publication AS b
     JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
     WHERE b.run_id = only_run AND p.topic_name IS NULL AND b.source_timestamp_ns IS NULL
-        AND EXISTS (SELECT 1 FROM orphan)
 ),
 sending AS (
     SELECT
@@ -111,15 +102,14 @@ incomplete AS (
     UNION
     SELECT process_id
     FROM store.publisher
-    WHERE run_id = only_run AND is_inferred AND NOT coalesce(is_internal, false)
+    WHERE run_id = only_run AND is_inferred AND NOT is_internal
     UNION
     SELECT process_id
     FROM store.subscription
-    WHERE run_id = only_run AND is_inferred AND NOT coalesce(is_internal, false)
+    WHERE run_id = only_run AND is_inferred AND NOT is_internal
     UNION
     SELECT process_id FROM store.node WHERE run_id = only_run AND is_inferred
 ),
-topic AS (SELECT DISTINCT topic_name FROM orphan WHERE topic_name IS NOT NULL),
 candidate AS (
     SELECT
         topic_name, process_id, created_ns,
@@ -129,7 +119,7 @@ candidate AS (
     WHERE topic_name IS NOT NULL
     UNION ALL
     SELECT t.topic_name, i.process_id, 0, false, false
-    FROM topic AS t
+    FROM (SELECT DISTINCT topic_name FROM orphan WHERE topic_name IS NOT NULL) AS t
     CROSS JOIN incomplete AS i
     WHERE (t.topic_name, i.process_id) NOT IN (
         SELECT (topic_name, process_id) FROM sending WHERE topic_name IS NOT NULL
@@ -214,34 +204,33 @@ passed AS (
         AND l.method = 'ring_buffer'
         AND l.subscription_id IN (SELECT subscription_id FROM orphan WHERE method = 'ring_buffer')
 ),
-buffered AS (
+kept AS (
     SELECT
-        o.take_id, o.process_id, o.taken_ns, p.recorded_from_ns,
-        coalesce(b.end_ns, o.created_ns, 0) AS since_ns
+        o.take_id,
+        coalesce(b.end_ns, o.created_ns, 0) AS since_ns,
+        since_ns < p.recorded_from_ns AS is_before_tracing,
+        g.covered_until_ns >= since_ns AS has_gap
     FROM orphan AS o
     LEFT JOIN presence AS p ON o.process_id = p.process_id
     ASOF LEFT JOIN passed AS b ON o.subscription_id = b.subscription_id AND o.taken_ns > b.taken_ns
+    ASOF LEFT JOIN gap AS g ON o.process_id = g.process_id AND o.taken_ns >= g.start_ns
     WHERE o.method = 'ring_buffer'
 ),
-kept AS (
+-- Publications that the stamp fits, though none of them could be chosen.
+fitting AS (
     SELECT
-        b.take_id,
-        b.since_ns < b.recorded_from_ns AS is_before_tracing,
-        g.covered_until_ns >= b.since_ns AS has_gap
-    FROM buffered AS b
-    ASOF LEFT JOIN gap AS g ON b.process_id = g.process_id AND b.taken_ns >= g.start_ns
+        o.take_id, o.process_id, o.created_ns, o.taken_ns,
+        coalesce(o.topic_name <> p.topic_name, false) AS is_of_another_topic
+    FROM orphan AS o
+    JOIN store.publication AS b ON o.stamp_ns = b.source_timestamp_ns
+    LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
+    WHERE b.run_id = only_run AND o.stamp_ns <> 0
 ),
 replaced AS (
     SELECT o.take_id
-    FROM (
-        SELECT DISTINCT o.take_id, o.process_id, o.created_ns, o.taken_ns
-        FROM orphan AS o
-        JOIN store.publication AS b ON o.stamp_ns = b.source_timestamp_ns
-        JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
-        WHERE b.run_id = only_run AND o.stamp_ns <> 0 AND p.topic_name <> o.topic_name
-    ) AS o
+    FROM fitting AS o
     ASOF JOIN gap AS g ON o.process_id = g.process_id AND o.taken_ns >= g.start_ns
-    WHERE g.covered_until_ns >= o.created_ns
+    WHERE o.is_of_another_topic AND g.covered_until_ns >= o.created_ns
 )
 SELECT
     only_run::BIGINT AS run_id,
@@ -257,14 +246,19 @@ SELECT
         END
         WHEN o.stamp_ns IS NULL THEN 'no_stamp'
         WHEN n.is_clock_set THEN 'clock_set'
-        WHEN coalesce(j.is_before_tracing, o.stamp_ns < (SELECT begin_ns FROM run_begin))
-            THEN 'before_tracing'
+        WHEN coalesce(
+            j.is_before_tracing,
+            o.stamp_ns < (
+                SELECT min(start_ns)
+                FROM store.trace
+                WHERE run_id = only_run AND domain IS DISTINCT FROM 'kernel'
+            )
+        ) THEN 'before_tracing'
         WHEN j.has_gap THEN 'publisher_gap'
         WHEN j.has_none_left AND j.has_silent THEN 'publisher_without_events'
         WHEN j.has_none_left AND NOT j.has_nameless THEN 'publisher_trace_ends'
-        WHEN o.take_id IN (
-            SELECT take_id FROM derive.take_candidate(only_run)
-        ) OR n.is_clock_set IS NOT NULL THEN 'ambiguous'
+        WHEN o.take_id IN (SELECT take_id FROM fitting WHERE NOT is_of_another_topic)
+            OR n.is_clock_set IS NOT NULL THEN 'ambiguous'
         WHEN o.take_id IN (SELECT take_id FROM replaced) THEN 'receiver_gap'
         WHEN j.has_silent THEN 'publisher_without_events'
         WHEN j.take_id IS NULL OR NOT (j.has_absent OR j.has_stampless)

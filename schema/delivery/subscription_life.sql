@@ -33,10 +33,9 @@ successor AS (
 ),
 -- Before Humble takes have no event of their own.
 showing AS (
-    SELECT DISTINCT p.host_id
-    FROM store.take AS t
-    JOIN store.process AS p ON t.process_id = p.process_id
-    WHERE t.source_timestamp_ns IS NOT NULL
+    SELECT host_id
+    FROM store.process
+    WHERE process_id IN (SELECT process_id FROM store.take WHERE source_timestamp_ns IS NOT NULL)
 )
 SELECT
     s.run_id, s.subscription_id,

@@ -29,7 +29,11 @@ CREATE OR REPLACE MACRO derive.undelivered(
 WITH arrival AS MATERIALIZED (
     SELECT
         publication_id, publisher_id, topic_name, clock_id, source_timestamp_ns, arrival_ns,
-        has_one_clock
+        has_one_clock,
+        row_number() OVER (
+            PARTITION BY topic_name, clock_id ORDER BY arrival_ns, publication_id
+        ) AS position,
+        count(*) OVER (PARTITION BY topic_name, clock_id ORDER BY arrival_ns) AS count_so_far
     FROM derive.expected_arrival
     WHERE run_id = only_run AND (has_clocks OR has_one_clock)
 ),
@@ -40,42 +44,26 @@ life AS MATERIALIZED (
     FROM derive.subscription_life
     WHERE run_id = only_run AND topic_name IS NOT NULL
 ),
-link AS (
-    SELECT publication_id, publisher_id, subscription_id, take_id
-    FROM store.link_transport
-    WHERE run_id = only_run AND subscription_id IS NOT NULL AND is_copy IS NOT TRUE
+delivered AS (
+    SELECT
+        l.publication_id, l.subscription_id,
+        min(t.taken_ns) AS taken_ns
+    FROM store.link_transport AS l
+    JOIN store.take AS t ON l.take_id = t.take_id
+    WHERE l.run_id = only_run AND l.is_copy IS NOT TRUE
+    GROUP BY l.publication_id, l.subscription_id
 ),
-missing AS MATERIALIZED (
+message AS MATERIALIZED (
     SELECT
         a.publication_id, a.publisher_id, s.subscription_id, a.topic_name, a.clock_id, a.arrival_ns,
-        a.has_one_clock,
-        a.source_timestamp_ns IS NULL AS has_no_stamp
+        a.has_one_clock, a.position,
+        a.source_timestamp_ns IS NULL AS has_no_stamp,
+        d.taken_ns
     FROM arrival AS a
     JOIN life AS s ON a.topic_name = s.topic_name AND a.clock_id = s.clock_id
-    ANTI JOIN link AS l
-        ON a.publication_id = l.publication_id AND s.subscription_id = l.subscription_id
-    ANTI JOIN derive.copied_pair AS c
-        ON a.publisher_id = c.publisher_id AND s.subscription_id = c.subscription_id
-),
-gap AS MATERIALIZED (
-    SELECT process_id, start_ns, covered_until_ns
-    FROM derive.process_gap(only_run, has_gaps, has_pauses)
-    WHERE EXISTS (SELECT 1 FROM missing)
-),
-delivered AS MATERIALIZED (
-    SELECT l.subscription_id, l.publisher_id, l.publication_id, a.arrival_ns, t.taken_ns
-    FROM (
-        SELECT
-            publication_id, publisher_id, subscription_id,
-            min(take_id) AS take_id
-        FROM link
-        WHERE subscription_id IN (SELECT subscription_id FROM missing)
-        GROUP BY publication_id, publisher_id, subscription_id
-    ) AS l
-    JOIN life AS s ON l.subscription_id = s.subscription_id
-    JOIN arrival AS a ON l.publication_id = a.publication_id AND s.clock_id = a.clock_id
-    JOIN store.take AS t ON l.take_id = t.take_id
-    WHERE a.arrival_ns IS NOT NULL
+    LEFT JOIN delivered AS d
+        ON a.publication_id = d.publication_id AND s.subscription_id = d.subscription_id
+    WHERE d.taken_ns IS NULL OR a.arrival_ns IS NOT NULL
 ),
 pace AS (
     SELECT
@@ -83,54 +71,43 @@ pace AS (
         greatest(max(taken_ns - arrival_ns), derive.delivery_limit().longest_ns) AS longest_ns,
         quantile_disc(taken_ns - arrival_ns, 0.5) AS usual_ns,
         greatest(
-            derive.delivery_limit().patience_factor * quantile_disc(taken_ns - arrival_ns, 0.5),
+            derive.delivery_limit().patience_factor * usual_ns,
             derive.delivery_limit().least_patience_ns
         ) AS patience_ns
-    FROM delivered
+    FROM message
+    WHERE taken_ns IS NOT NULL
     GROUP BY subscription_id
 ),
--- In most recordings few messages are missing, and to order all others would be most of the work.
--- Of a tenth of a second in which none is missing, the first arrival and the first take count.
-missing_tenth AS (
-    SELECT DISTINCT
-        subscription_id,
-        derive.tenth_of_second(arrival_ns) AS tenth
-    FROM missing
-),
-condensed AS MATERIALIZED (
+-- With the first take of anything that came later, of the same publisher and of any; what came at
+-- the same moment counts with it.
+missing AS MATERIALIZED (
     SELECT
-        d.subscription_id, d.publisher_id,
-        min(d.arrival_ns) AS arrival_ns,
-        min(d.taken_ns) AS taken_ns
-    FROM delivered AS d
-    LEFT JOIN missing_tenth AS m
-        ON d.subscription_id = m.subscription_id AND derive.tenth_of_second(d.arrival_ns) = m.tenth
-    GROUP BY
-        d.subscription_id, d.publisher_id, derive.tenth_of_second(d.arrival_ns),
-        CASE WHEN m.tenth IS NOT NULL THEN d.publication_id END
+        publication_id, publisher_id, subscription_id, topic_name, clock_id, arrival_ns,
+        has_one_clock, position, has_no_stamp,
+        min(taken_ns) OVER later_of_publisher AS publisher_taken_ns,
+        min(arrival_ns) FILTER (taken_ns IS NOT NULL) OVER later_of_publisher
+            AS publisher_arrival_ns,
+        min(taken_ns) OVER later_of_any AS any_taken_ns,
+        min(arrival_ns) FILTER (taken_ns IS NOT NULL) OVER later_of_any AS next_arrival_ns,
+        min(arrival_ns) FILTER (taken_ns IS NOT NULL) OVER (
+            PARTITION BY subscription_id, publisher_id
+        ) AS first_arrival_ns
+    FROM message
+    WHERE subscription_id IN (SELECT subscription_id FROM message WHERE taken_ns IS NULL)
+    WINDOW
+        later_of_publisher AS (
+            PARTITION BY subscription_id, publisher_id
+            ORDER BY arrival_ns DESC NULLS FIRST, taken_ns NULLS FIRST ROWS UNBOUNDED PRECEDING
+        ),
+        later_of_any AS (
+            PARTITION BY subscription_id
+            ORDER BY arrival_ns DESC NULLS FIRST, taken_ns NULLS FIRST ROWS UNBOUNDED PRECEDING
+        )
+    QUALIFY taken_ns IS NULL
 ),
--- The first take of anything that came later, of the same publisher and of any; what came at the
--- same moment counts with it.
-later_of_publisher AS (
-    SELECT
-        subscription_id, publisher_id, arrival_ns,
-        min(taken_ns) OVER (
-            PARTITION BY subscription_id, publisher_id ORDER BY arrival_ns DESC
-        ) AS taken_ns
-    FROM condensed
-),
-later_of_any AS (
-    SELECT
-        subscription_id, arrival_ns,
-        min(taken_ns) OVER (PARTITION BY subscription_id ORDER BY arrival_ns DESC) AS taken_ns
-    FROM condensed
-),
-earliest AS (
-    SELECT
-        subscription_id, publisher_id,
-        min(arrival_ns) AS arrival_ns
-    FROM condensed
-    GROUP BY subscription_id, publisher_id
+gap AS MATERIALIZED (
+    SELECT process_id, start_ns, covered_until_ns
+    FROM derive.process_gap(only_run, has_gaps, has_pauses)
 ),
 -- Takes that could be any message, and those that could be one without a stamp.
 unidentified AS (
@@ -140,9 +117,7 @@ unidentified AS (
         t.method = 'ring_buffer' AS is_from_buffer
     FROM store.orphan_take AS o
     JOIN store.take AS t ON o.take_id = t.take_id
-    WHERE has_orphans
-        AND o.run_id = only_run
-        AND t.subscription_id IN (SELECT subscription_id FROM missing)
+    WHERE has_orphans AND o.run_id = only_run
 ),
 -- The first that may be of a message from before: a stamp would identify one that was kept. Before
 -- Iron only the callback tells what comes from a buffer.
@@ -161,12 +136,7 @@ first_unidentified AS (
 one_thread AS (
     SELECT publisher_id
     FROM store.publication
-    WHERE run_id = only_run
-        AND publisher_id IN (
-            SELECT publisher_id
-            FROM missing
-            WHERE subscription_id IN (SELECT subscription_id FROM unidentified)
-        )
+    WHERE has_orphans AND run_id = only_run
     GROUP BY publisher_id
     HAVING min(thread_id) = max(thread_id)
 ),
@@ -180,14 +150,8 @@ long_wait AS (
         AND w.end_ns - w.start_ns > coalesce(p.patience_ns, derive.delivery_limit().longest_ns)
         AND s.subscription_id IN (SELECT subscription_id FROM missing)
 ),
-kept_waiting AS (
-    SELECT s.subscription_id
-    FROM life AS s
-    JOIN derive.hanging_callback AS c ON s.only_thread_id = c.thread_id
-    WHERE has_open_callbacks AND c.run_id = only_run
-),
 -- While a clock is set, no take shows which message it is of.
-while_set AS MATERIALIZED (
+while_set AS (
     SELECT b.publication_id
     FROM derive.clock_step(only_run) AS z
     JOIN store.host AS h ON z.clock_id = h.clock_id
@@ -198,156 +162,78 @@ while_set AS MATERIALIZED (
         AND b.end_ns <= coalesce(z.end_ns, 9223372036854775807)
     WHERE has_steps AND b.run_id = only_run
 ),
-known AS (
+known AS MATERIALIZED (
     SELECT
-        m.publication_id, m.publisher_id, m.subscription_id, m.topic_name, m.clock_id, m.arrival_ns,
-        m.has_no_stamp, s.process_id, s.queue_depth, s.created_ns, s.last_seen_ns, s.replaced_ns,
-        s.host_end_ns, s.shows_takes, s.is_agnocast,
+        m.*, s.process_id, s.queue_depth, s.created_ns, s.last_seen_ns, s.replaced_ns,
+        s.host_end_ns, s.only_thread_id, s.shows_takes, s.is_agnocast,
+        m.first_arrival_ns IS NOT NULL AS is_connected,
+        m.first_arrival_ns > m.arrival_ns AS is_before_first,
         CASE
-            WHEN m.has_one_clock OR e.arrival_ns IS NULL THEN m.arrival_ns
+            WHEN m.has_one_clock OR NOT is_connected THEN m.arrival_ns
             ELSE m.arrival_ns - derive.delivery_limit().stamp_slack_ns
         END AS least_arrival_ns,
         coalesce(c.longest_ns, derive.delivery_limit().longest_ns) AS longest_ns,
         coalesce(c.patience_ns, derive.delivery_limit().longest_ns) AS patience_ns,
         c.usual_ns,
-        p.taken_ns AS publisher_taken_ns,
-        p.arrival_ns AS publisher_arrival_ns,
-        n.taken_ns AS any_taken_ns,
-        n.arrival_ns AS next_arrival_ns,
-        e.arrival_ns > m.arrival_ns AS is_before_first,
+        m.arrival_ns + coalesce(c.patience_ns, derive.delivery_limit().longest_ns) AS due_ns,
         -- From when on publisher and subscription could know each other: they need not have before.
         greatest(
             coalesce(s.created_ns, 0),
             CASE WHEN m.has_one_clock THEN coalesce(b.created_ns, 0) ELSE 0 END
         ) AS introduced_ns,
-        e.arrival_ns IS NOT NULL AS is_connected,
         s.only_thread_id IS NOT NULL AND t.publisher_id IS NOT NULL AS is_in_order,
         least(CASE WHEN b.process_id = s.process_id THEN k.from_buffer_ns END, k.other_ns)
             AS unidentified_ns,
-        unidentified_ns <= coalesce(n.taken_ns, unidentified_ns) AS may_be_kept
+        unidentified_ns <= coalesce(m.any_taken_ns, unidentified_ns) AS may_be_kept,
+        count(*) OVER (PARTITION BY m.subscription_id, m.next_arrival_ns) AS row_length,
+        count(*) FILTER (m.arrival_ns <= s.last_seen_ns) OVER (
+            PARTITION BY m.subscription_id, m.publisher_id, m.publisher_arrival_ns
+        ) AS publisher_row_length,
+        min(m.arrival_ns) FILTER (m.arrival_ns > s.last_seen_ns) OVER (
+            PARTITION BY m.subscription_id
+        ) AS first_unseen_ns
     FROM missing AS m
     JOIN life AS s ON m.subscription_id = s.subscription_id
     JOIN store.publisher AS b ON m.publisher_id = b.publisher_id
     LEFT JOIN pace AS c ON m.subscription_id = c.subscription_id
     LEFT JOIN one_thread AS t ON m.publisher_id = t.publisher_id
     LEFT JOIN first_unidentified AS k ON m.subscription_id = k.subscription_id
-    LEFT JOIN earliest AS e
-        ON m.subscription_id = e.subscription_id AND m.publisher_id = e.publisher_id
-    ASOF LEFT JOIN later_of_publisher AS p
-        ON m.subscription_id = p.subscription_id
-        AND m.publisher_id = p.publisher_id
-        AND m.arrival_ns < p.arrival_ns
-    ASOF LEFT JOIN later_of_any AS n
-        ON m.subscription_id = n.subscription_id AND m.arrival_ns < n.arrival_ns
+    ANTI JOIN derive.copied_pair AS y
+        ON m.publisher_id = y.publisher_id AND m.subscription_id = y.subscription_id
 ),
-due AS MATERIALIZED (
-    SELECT
-        *,
-        arrival_ns + patience_ns AS due_ns,
-        count(*) OVER (PARTITION BY subscription_id, next_arrival_ns) AS row_length,
-        count(*) FILTER (arrival_ns <= last_seen_ns) OVER (
-            PARTITION BY subscription_id, publisher_id, publisher_arrival_ns
-        ) AS publisher_row_length
-    FROM known
-),
-due_tenth AS (
-    SELECT DISTINCT
-        subscription_id,
-        derive.tenth_of_second(due_ns) AS tenth
-    FROM due
-),
--- Of a tenth in which no message is due, only the first wait can be the next one after any.
-condensed_wait AS (
-    SELECT
-        w.subscription_id,
-        min(w.end_ns) AS end_ns,
-        arg_min(w.start_ns, w.end_ns) AS start_ns
-    FROM long_wait AS w
-    LEFT JOIN due_tenth AS d
-        ON w.subscription_id = d.subscription_id AND derive.tenth_of_second(w.end_ns) = d.tenth
-    GROUP BY
-        w.subscription_id, derive.tenth_of_second(w.end_ns),
-        CASE WHEN d.tenth IS NOT NULL THEN w.end_ns END
-),
--- When it was certain that the message is not in the queue: the reader waited for long, after the
--- message had arrived, and before the next message that was taken arrived. That tells nothing if
--- the reader may have been kept from the CPU: if it took that next message late, or if as many
--- messages are missing in a row as its queue holds.
-waiting AS (
+-- `waited_ns`: when it was certain that the message is not in the queue: the reader waited for
+-- long, after the message had arrived, and before the next message that was taken arrived. That
+-- tells nothing if the reader may have been kept from the CPU: if it took that next message late,
+-- or if as many messages are missing in a row as its queue holds.
+bounded AS MATERIALIZED (
     SELECT
         k.*,
-        CASE WHEN w.end_ns IS NOT NULL THEN greatest(w.start_ns, k.arrival_ns) + k.patience_ns END
-            AS due_by_ns,
-        least(w.end_ns, k.any_taken_ns, k.next_arrival_ns) AS waits_until_ns,
-        w.end_ns AS wakes_ns,
+        greatest(w.start_ns, k.arrival_ns) + k.patience_ns AS due_by_ns,
         k.next_arrival_ns < w.end_ns
         AND k.any_taken_ns >= w.end_ns
         AND (
             w.end_ns - greatest(w.start_ns, k.next_arrival_ns)
             > derive.delivery_limit().patience_factor * k.usual_ns
             OR k.row_length >= greatest(k.queue_depth, derive.delivery_limit().least_row)
-        ) AS is_starved
-    FROM due AS k
-    ASOF LEFT JOIN condensed_wait AS w
-        ON k.subscription_id = w.subscription_id AND k.due_ns <= w.end_ns
-),
-decided AS (
-    SELECT
-        *,
-        CASE WHEN due_by_ns <= waits_until_ns AND is_starved IS NOT TRUE THEN due_by_ns END
-            AS waited_ns
-    FROM waiting
-),
-bounded AS MATERIALIZED (
-    SELECT
-        *,
+        ) AS is_starved,
+        CASE
+            WHEN w.end_ns IS NOT NULL
+                AND due_by_ns <= least(w.end_ns, k.any_taken_ns, k.next_arrival_ns)
+                AND is_starved IS NOT TRUE THEN due_by_ns
+        END AS waited_ns,
         coalesce(
-            least(publisher_taken_ns, waited_ns),
-            least(greatest(arrival_ns, last_seen_ns) + longest_ns, replaced_ns)
+            least(k.publisher_taken_ns, waited_ns),
+            least(greatest(k.arrival_ns, k.last_seen_ns) + k.longest_ns, k.replaced_ns)
         ) AS until_ns,
         -- A reader that waits for the CPU takes what came by the time it gets it.
-        CASE WHEN waited_ns IS NOT NULL THEN least(publisher_taken_ns, wakes_ns + patience_ns) END
-            AS awake_until_ns,
-        coalesce(any_taken_ns, least(last_seen_ns, replaced_ns)) AS gone_ns,
-        min(CASE WHEN arrival_ns > last_seen_ns THEN arrival_ns END) OVER (
-            PARTITION BY subscription_id
-        ) AS first_unseen_ns
-    FROM decided
-),
--- The place of each missing message among those of its topic, and of the last one before it was
--- gone. Of any other tenth of a second the number of messages is enough.
-wanted_tenth AS (
-    SELECT DISTINCT
-        topic_name, clock_id,
-        derive.tenth_of_second(unnest([arrival_ns, gone_ns])) AS tenth
-    FROM bounded
-),
-ordered AS MATERIALIZED (
-    SELECT
-        topic_name, clock_id, publication_id, arrival_ns,
-        sum(message_count) OVER (
-            PARTITION BY topic_name, clock_id ORDER BY arrival_ns, publication_id
-            ROWS UNBOUNDED PRECEDING
-        ) AS position,
-        sum(message_count) OVER (
-            PARTITION BY topic_name, clock_id ORDER BY arrival_ns
-        ) AS count_so_far
-    FROM (
-        SELECT
-            a.topic_name, a.clock_id,
-            CASE WHEN w.topic_name IS NOT NULL THEN a.publication_id END AS publication_id,
-            max(a.arrival_ns) AS arrival_ns,
-            count(*) AS message_count
-        FROM arrival AS a
-        LEFT JOIN wanted_tenth AS w
-            ON a.topic_name = w.topic_name
-            AND a.clock_id = w.clock_id
-            AND derive.tenth_of_second(a.arrival_ns) IS NOT DISTINCT FROM w.tenth
-        WHERE (a.topic_name, a.clock_id) IN (SELECT (topic_name, clock_id) FROM missing)
-        GROUP BY
-            a.topic_name, a.clock_id, derive.tenth_of_second(a.arrival_ns),
-            CASE WHEN w.topic_name IS NOT NULL THEN a.publication_id END
-    )
+        CASE
+            WHEN waited_ns IS NOT NULL
+                THEN least(k.publisher_taken_ns, w.end_ns + k.patience_ns)
+        END AS awake_until_ns,
+        coalesce(k.any_taken_ns, least(k.last_seen_ns, k.replaced_ns)) AS gone_ns
+    FROM known AS k
+    ASOF LEFT JOIN long_wait AS w
+        ON k.subscription_id = w.subscription_id AND k.due_ns <= w.end_ns
 ),
 facts AS (
     SELECT
@@ -361,9 +247,8 @@ facts AS (
             CASE WHEN b.is_in_order THEN b.publisher_taken_ns END,
             greatest(b.gone_ns, b.due_ns)
         ) AS has_unidentified_take,
-        q.count_so_far - o.position AS newer_count
+        q.count_so_far - b.position AS newer_count
     FROM bounded AS b
-    JOIN ordered AS o ON b.publication_id = o.publication_id AND b.clock_id = o.clock_id
     ASOF LEFT JOIN gap AS g ON b.process_id = g.process_id
         AND coalesce(b.awake_until_ns, b.until_ns) >= g.start_ns
     ASOF LEFT JOIN gap AS i ON b.process_id = i.process_id AND b.arrival_ns >= i.start_ns
@@ -374,17 +259,13 @@ facts AS (
     ASOF LEFT JOIN (
         SELECT
             subscription_id, taken_ns,
-            false AS for_no_stamp
-        FROM unidentified
-        WHERE has_no_stamp
-        UNION ALL
-        SELECT subscription_id, taken_ns, true
+            unnest(CASE WHEN has_no_stamp THEN [true, false] ELSE [true] END) AS for_no_stamp
         FROM unidentified
     ) AS u
         ON b.subscription_id = u.subscription_id
         AND b.has_no_stamp = u.for_no_stamp
         AND b.least_arrival_ns <= u.taken_ns
-    ASOF LEFT JOIN ordered AS q
+    ASOF LEFT JOIN arrival AS q
         ON b.topic_name = q.topic_name AND b.clock_id = q.clock_id AND b.gone_ns >= q.arrival_ns
 ),
 -- What is said of several messages of a pair alike. Before the first that was taken: whether the
@@ -425,8 +306,11 @@ SELECT
         WHEN replaced_ns < arrival_ns THEN 'subscription_ended'
         WHEN has_gap THEN 'receiver_gap'
         WHEN arrival_ns > last_seen_ns AND host_end_ns - first_unseen_ns > longest_ns
-            THEN CASE WHEN subscription_id IN (SELECT subscription_id FROM kept_waiting)
-                THEN 'reader_in_callback' ELSE 'subscription_ended' END
+            THEN CASE WHEN only_thread_id IN (
+                SELECT thread_id
+                FROM derive.hanging_callback
+                WHERE has_open_callbacks AND run_id = only_run
+            ) THEN 'reader_in_callback' ELSE 'subscription_ended' END
         WHEN is_agnocast AND any_taken_ns IS NOT NULL THEN 'overwritten'
         WHEN has_unidentified_take THEN 'unknown'
         WHEN publication_id IN (SELECT publication_id FROM while_set WHERE has_steps) THEN 'unknown'

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import random
 from collections.abc import Iterator
 
 import duckdb
 import pytest
 from support.rules import derived, insert
-from support.thorough import examples, few
 
 MS = 1_000_000
 # The input of the rules, without the views and tables that it comes from.
@@ -53,7 +51,7 @@ INSERT INTO store.process VALUES (1, 1);
 INSERT INTO store.host VALUES (1, 1);
 INSERT INTO store.publisher VALUES (1, 0, 1), (2, 0, 1);
 """
-RULES = ("delivery_limit", "tenth_of_second", "undelivered")
+RULES = ("delivery_limit", "undelivered")
 
 
 class Delivery:
@@ -857,100 +855,6 @@ def test_messages_that_arrive_at_the_same_moment_are_newer_alike(delivery: Deliv
     for _ in range(3):
         delivery.publish(310 * MS, 310 * MS)
     assert delivery.reason(missing) == "overwritten"
-
-
-# Moments of one tenth of a second are looked at one by one: with the first length, all of them.
-@pytest.mark.parametrize("grid", few([1, 5 * MS], 5 * MS))
-@pytest.mark.parametrize("seed", few(range(5), 0))
-def test_the_length_of_a_tenth_of_second_decides_nothing(
-    delivery: Delivery, seed: int, grid: int
-) -> None:
-    """Nor where messages arrive at the same moment, or before time begins."""
-    fill(delivery.con, random.Random(seed), grid, begin=-300 * MS if grid > 1 else 0)
-    found = []
-    for length in (1 << 62, 7 * MS, 100 * MS, 30 * MS)[: examples(2, 4)]:
-        delivery.con.execute(
-            f"CREATE OR REPLACE MACRO derive.tenth_of_second(at_ns) AS at_ns // {length}"
-        )
-        rows = delivery.con.execute("FROM derive.undelivered(1) ORDER BY ALL").fetchall()
-        found.append(rows)
-    assert len({row[-1] for row in found[0]}) > 3
-    assert found[1:] == found[:1] * (len(found) - 1)
-
-
-def fill(con: duckdb.DuckDBPyConnection, chance: random.Random, grid: int, begin: int) -> None:
-    """Four subscriptions of three publishers, with all that can keep a message from them."""
-    sampled = chance.sample(range(2_000 * MS), 400)
-    moments = [begin + moment // grid * grid for moment in sampled]
-    for number in range(4):
-        last = chance.randrange(1_500 * MS, 2_100 * MS)
-        con.execute(
-            "INSERT INTO derive.subscription_life (subscription_id, topic_name, process_id, "
-            "queue_depth, created_ns, last_seen_ns, replaced_ns, host_end_ns, only_thread_id) "
-            "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-            [
-                number,
-                "/b" if number == 3 else "/a",
-                number,
-                chance.choice([1, 3, None]),
-                chance.choice([0, 300 * MS]),
-                last,
-                chance.choice([None, last - 50 * MS]),
-                2_100 * MS,
-                chance.choice([number, None]),
-            ],
-        )
-        for start in chance.sample(moments, 2):
-            con.execute("INSERT INTO process_gap VALUES (?, ?, ?)", [number, start, start + 5 * MS])
-        for failed in chance.sample(moments, 3):
-            con.execute("INSERT INTO derive.empty_take VALUES (1, ?, ?)", [number, failed + 1])
-        start = begin
-        while start < 2_000 * MS:
-            end = start + chance.randrange(4 * MS, 30 * MS)
-            con.execute(
-                "INSERT INTO derive.executor_interval (thread_id, start_ns, end_ns) "
-                "VALUES (?, ?, ?)",
-                [number, start, end],
-            )
-            start = end + chance.randrange(5 * MS)
-        # One that could not be identified.
-        con.execute(
-            "INSERT INTO store.take VALUES (1, ?, ?, ?, ?, 'rmw')",
-            [10_000 + number, number, chance.choice(moments), chance.choice([None, 1])],
-        )
-    con.execute("INSERT INTO store.publisher VALUES (3, 500_000_000, 1)")
-    take = 0
-    for publication, arrival in enumerate(moments):
-        publisher = chance.choice([1, 2, 3])
-        con.execute(
-            "INSERT INTO derive.expected_arrival (publication_id, publisher_id, topic_name, "
-            "arrival_ns, source_timestamp_ns) VALUES (?, ?, ?, ?, ?)",
-            [
-                publication,
-                publisher,
-                "/b" if publisher == 3 else "/a",
-                None if publication == 200 else arrival,
-                chance.choice([1, 1, None]),
-            ],
-        )
-        con.execute(
-            "INSERT INTO store.publication (publisher_id, thread_id) VALUES (?, ?)",
-            [publisher, chance.choice([1, 2]) if publisher == 2 else 1],
-        )
-        for number in [3] if publisher == 3 else range(3):
-            is_bad_time = arrival // (250 * MS) % 3 == number % 3
-            if chance.random() < (0.3 if is_bad_time else 0.02):
-                continue
-            take += 1
-            needed = chance.choice([300_000, 400_000, 20 * MS])
-            con.execute(
-                "INSERT INTO store.take VALUES (1, ?, ?, ?, 1, 'rmw')",
-                [take, number, arrival + needed],
-            )
-            con.execute(
-                "INSERT INTO store.link_transport VALUES (1, ?, ?, ?, ?, false)",
-                [publication, publisher, number, take],
-            )
 
 
 def test_agnocast_loses_nothing(delivery: Delivery) -> None:

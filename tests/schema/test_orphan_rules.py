@@ -45,7 +45,6 @@ TABLES = {
         f"run_id = 1, process_id = 1, begin_ns = {100 * MS}, recorded_from_ns = {100 * MS}"
     ),
     "derive.process_gap": "process_id = 1, start_ns, covered_until_ns",
-    "derive.take_candidate": "take_id",
     "derive.unstamped_call": "process_id, publisher_id, is_without_event",
 }
 STAGE = f"""
@@ -469,7 +468,8 @@ def test_who_was_created_later_on_its_own_clock(con: duckdb.DuckDBPyConnection) 
 @pytest.mark.parametrize(
     "statement",
     [
-        "INSERT INTO take_candidate VALUES (1)",
+        f"INSERT INTO store.publication (source_timestamp_ns) VALUES ({STAMP})",
+        f"INSERT INTO store.publication (source_timestamp_ns, publisher_id) VALUES ({STAMP}, NULL)",
         "INSERT INTO store.nearest_message (publication_id) VALUES (NULL)",
     ],
 )
@@ -618,7 +618,7 @@ def test_the_first_message_was_put_behind_the_creation(
     [
         ("/b", STAMP, 400 * MS, STAMP + MS, "receiver_gap"),
         # Its own topic, another message, or none.
-        ("/a", STAMP, 400 * MS, STAMP + MS, "publisher_not_traced"),
+        ("/a", STAMP, 400 * MS, STAMP + MS, "ambiguous"),
         ("/b", STAMP + 1, 400 * MS, STAMP + MS, "publisher_not_traced"),
         # The subscription was created in the gap, or at its end, or behind it.
         ("/b", STAMP, 420 * MS, STAMP + MS, "receiver_gap"),
