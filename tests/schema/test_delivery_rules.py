@@ -857,6 +857,41 @@ def test_messages_that_arrive_at_the_same_moment_are_newer_alike(delivery: Deliv
     assert delivery.reason(missing) == "overwritten"
 
 
+@pytest.mark.parametrize("publisher", [1, 2])
+def test_what_is_taken_of_the_same_moment_came_no_later(delivery: Delivery, publisher: int) -> None:
+    """Nothing tells in which order they came. What came a nanosecond later overtook it."""
+    delivery.lives()
+    delivery.publish(0, 300_000)
+    delivery.publish(300 * MS, 301 * MS, publisher)
+    missing = delivery.publish(300 * MS)
+    delivery.publish(300 * MS, 301 * MS, publisher)
+    assert delivery.reason(missing) == "pending_at_end"
+    delivery.publish(300 * MS + 1, 301 * MS, publisher)
+    assert delivery.reason(missing) == ("lost_in_transport" if publisher == 1 else "unknown")
+
+
+def test_a_message_of_which_nothing_tells_when_it_came_is_no_later_one(
+    delivery: Delivery,
+) -> None:
+    delivery.lives()
+    delivery.publish(0, 300_000)
+    missing = delivery.publish(300 * MS)
+    taken = delivery.publish(400 * MS, 401 * MS)
+    assert delivery.reason(missing) == "lost_in_transport"
+    unknown = "UPDATE derive.expected_arrival SET arrival_ns = NULL WHERE publication_id = ?"
+    delivery.con.execute(unknown, [taken])
+    assert delivery.reason(missing) == "pending_at_end"
+
+
+def test_where_copies_are_taken_nothing_is_missing(delivery: Delivery) -> None:
+    delivery.lives()
+    delivery.publish(300 * MS)
+    delivery.publish(300 * MS, publisher=2)
+    delivery.con.execute("INSERT INTO derive.copied_pair VALUES (1, 1)")
+    found = delivery.con.execute("SELECT publisher_id FROM derive.undelivered(1)").fetchall()
+    assert found == [(2,)]
+
+
 def test_agnocast_loses_nothing(delivery: Delivery) -> None:
     """What a reader passed over was overwritten, also before the first message that it took."""
     delivery.lives(is_agnocast=True)
