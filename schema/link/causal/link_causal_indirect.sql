@@ -129,27 +129,21 @@ nested AS (
         AND d.read_event_id >= e.effective_end_event_id
     WHERE e.start_event_id > d.cut_event_id
 ),
--- Publications of one callback instance share their cut.
-cut AS (SELECT DISTINCT annotation_id, subscription_id, cut_event_id, emptied_event_id FROM demand),
-at_cut AS MATERIALIZED (
-    SELECT
-        c.annotation_id, c.subscription_id, c.cut_event_id, e.callback_instance_id, e.start_event_id
-    FROM cut AS c
-    ASOF JOIN ended AS e
-        ON c.annotation_id = e.annotation_id
-        AND c.subscription_id = e.subscription_id
-        AND c.cut_event_id >= e.effective_end_event_id
-    WHERE e.effective_end_event_id > c.emptied_event_id
-),
+-- What was in the cache at the cut. What else may have been used ended after that began.
 there AS MATERIALIZED (
     SELECT
-        d.*, c.callback_instance_id,
-        c.start_event_id AS input_start_event_id
+        d.*,
+        CASE WHEN e.effective_end_event_id > d.emptied_event_id THEN e.callback_instance_id END
+            AS callback_instance_id,
+        greatest(
+            CASE WHEN e.effective_end_event_id > d.emptied_event_id THEN e.start_event_id END,
+            d.kept_event_id
+        ) AS since_event_id
     FROM demand AS d
-    LEFT JOIN at_cut AS c
-        ON d.annotation_id = c.annotation_id
-        AND d.subscription_id = c.subscription_id
-        AND d.cut_event_id = c.cut_event_id
+    ASOF LEFT JOIN ended AS e
+        ON d.annotation_id = e.annotation_id
+        AND d.subscription_id = e.subscription_id
+        AND d.cut_event_id >= e.effective_end_event_id
 ),
 -- Instances in the order in which they began. Each has the instance that ends last among itself and
 -- those before it.
@@ -168,39 +162,26 @@ begun AS (
 -- The last to end before the publication, else one that was under way then.
 possible AS (
     SELECT
-        p.annotation_id, p.publication_id, p.subscription_id,
+        t.annotation_id, t.publication_id, t.subscription_id,
         CASE
-            WHEN e.effective_end_event_id > p.since_event_id THEN e.callback_instance_id
-            ELSE p.last_id
+            WHEN e.effective_end_event_id > t.since_event_id THEN e.callback_instance_id
+            ELSE b.last_id
         END AS callback_instance_id,
-        p.since_event_id, p.begun_count
-    FROM (
-        SELECT
-            t.annotation_id, t.publication_id, t.subscription_id, t.read_event_id,
-            greatest(t.input_start_event_id, t.kept_event_id) AS since_event_id,
-            b.run_count AS begun_count,
-            b.last_id
-        FROM there AS t
-        ASOF JOIN begun AS b
-            ON t.annotation_id = b.annotation_id
-            AND t.subscription_id = b.subscription_id
-            AND t.read_event_id > b.start_event_id
-        WHERE b.last_event_id > greatest(t.input_start_event_id, t.kept_event_id)
-    ) AS p
+        b.run_count - coalesce(o.run_count, 0) AS run_count
+    FROM there AS t
+    ASOF JOIN begun AS b
+        ON t.annotation_id = b.annotation_id
+        AND t.subscription_id = b.subscription_id
+        AND t.read_event_id > b.start_event_id
     ASOF LEFT JOIN free_ended AS e
-        ON p.annotation_id = e.annotation_id
-        AND p.subscription_id = e.subscription_id
-        AND p.read_event_id >= e.effective_end_event_id
-),
-counted AS (
-    SELECT
-        p.annotation_id, p.publication_id, p.subscription_id, p.callback_instance_id,
-        p.begun_count - coalesce(e.run_count, 0) AS run_count
-    FROM possible AS p
-    ASOF LEFT JOIN free_ended AS e
-        ON p.annotation_id = e.annotation_id
-        AND p.subscription_id = e.subscription_id
-        AND p.since_event_id >= e.effective_end_event_id
+        ON t.annotation_id = e.annotation_id
+        AND t.subscription_id = e.subscription_id
+        AND t.read_event_id >= e.effective_end_event_id
+    ASOF LEFT JOIN free_ended AS o
+        ON t.annotation_id = o.annotation_id
+        AND t.subscription_id = o.subscription_id
+        AND t.since_event_id >= o.effective_end_event_id
+    WHERE b.last_event_id > t.since_event_id
 ),
 cached AS (
     SELECT
@@ -211,14 +192,12 @@ cached AS (
             CASE WHEN d.kind = 'partial_sync' AND a.outer_id IS NULL THEN p.callback_instance_id END
         ) AS callback_instance_id,
         CASE
-            WHEN d.kind = 'periodic_async' THEN
-                coalesce(p.run_count, 1) + (d.callback_instance_id IS NULL)::BIGINT
-            WHEN n.callback_instance_id IS NOT NULL THEN
+            WHEN d.kind = 'partial_sync' AND n.callback_instance_id IS NOT NULL THEN
                 1 + coalesce(p.run_count, (d.callback_instance_id IS NOT NULL)::BIGINT)
             ELSE coalesce(p.run_count, 1) + (d.callback_instance_id IS NULL)::BIGINT
         END AS candidate_count
     FROM there AS d
-    LEFT JOIN counted AS p
+    LEFT JOIN possible AS p
         ON d.annotation_id = p.annotation_id
         AND d.publication_id = p.publication_id
         AND d.subscription_id = p.subscription_id
@@ -230,20 +209,10 @@ cached AS (
         ON d.publishing_id = a.callback_instance_id AND p.callback_instance_id = a.outer_id
 ),
 linked AS (
-    SELECT
-        run_id, annotation_id, kind, publication_id, callback_instance_id, candidate_count,
-        trace_id, thread_id, start_ns, start_event_id,
-        NULL::BIGINT AS since_ns
     FROM cached
-    UNION ALL
-    SELECT
-        run_id, annotation_id, kind, publication_id, callback_instance_id, candidate_count,
-        trace_id, thread_id, start_ns, start_event_id, since_ns
+    UNION ALL BY NAME
     FROM derive.link_causal_approximate(only_run, 'annotated', 'input_run')
-    UNION ALL
-    SELECT
-        run_id, annotation_id, kind, publication_id, callback_instance_id, candidate_count,
-        trace_id, thread_id, start_ns, start_event_id, NULL
+    UNION ALL BY NAME
     FROM derive.link_causal_queue(only_run, 'annotated', 'input_run')
 ),
 -- A message that is missing may have been the right one, since the first that was looked at.
@@ -266,16 +235,14 @@ exposed AS MATERIALIZED (
         f.input_thread_id, f.start_event_id, f.input_start_event_id,
         g.start_ns >= f.input_start_ns AS begins_between
     FROM (
-        SELECT n.*, x.recording_id
-        FROM found AS n
-        JOIN derive.exposed_trace AS x ON n.trace_id = x.trace_id
-        UNION
-        SELECT n.*, x.recording_id
-        FROM found AS n
-        JOIN derive.exposed_trace AS x ON n.input_trace_id = x.trace_id
+        SELECT
+            *,
+            unnest([trace_id, input_trace_id]) AS either_trace_id
+        FROM found
     ) AS f
+    JOIN derive.exposed_trace AS x ON f.either_trace_id = x.trace_id
     ASOF JOIN derive.recording_gap AS g
-        ON f.recording_id = g.recording_id AND f.start_ns > g.start_ns
+        ON x.recording_id = g.recording_id AND f.start_ns > g.start_ns
     WHERE g.covered_until_ns >= f.since_ns
 ),
 -- What may have been lost on other CPUs is marked.

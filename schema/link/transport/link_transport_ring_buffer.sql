@@ -30,22 +30,18 @@ cleared AS (
         AND s.event_id > c.event_id
     WHERE c.event_id > s.previous_event_id
 ),
-exposed AS (
-    SELECT s.take_id, s.process_id, s.buffer_handle, s.at_ns, s.previous_ns, x.recording_id
-    FROM slot_use AS s
-    JOIN derive.exposed_trace AS x ON s.trace_id = x.trace_id
-    UNION ALL
-    SELECT s.take_id, s.process_id, s.buffer_handle, s.at_ns, s.previous_ns, x.recording_id
-    FROM slot_use AS s
-    JOIN derive.exposed_trace AS x ON s.previous_trace_id = x.trace_id
-    WHERE s.previous_trace_id <> s.trace_id
-),
 behind_gap AS (
     SELECT
         e.take_id, e.process_id, e.buffer_handle,
         e.at_ns - e.previous_ns AS stay_ns
-    FROM exposed AS e
-    ASOF JOIN derive.recording_gap AS g ON e.recording_id = g.recording_id AND e.at_ns > g.start_ns
+    FROM (
+        SELECT
+            take_id, process_id, buffer_handle, at_ns, previous_ns,
+            unnest([trace_id, previous_trace_id]) AS either_trace_id
+        FROM slot_use
+    ) AS e
+    JOIN derive.exposed_trace AS x ON e.either_trace_id = x.trace_id
+    ASOF JOIN derive.recording_gap AS g ON x.recording_id = g.recording_id AND e.at_ns > g.start_ns
     WHERE g.start_ns >= e.previous_ns OR g.covered_until_ns > e.previous_ns
 ),
 -- The time from one message put into a buffer to the next, where no gap lies in between.
