@@ -83,14 +83,11 @@ gap AS (
     SELECT run_id, process_id, start_ns, end_ns FROM absence WHERE has_pauses
     UNION ALL
     SELECT
-        run_id, process_id, begin_ns,
-        first_ns - 1
+        run_id, process_id,
+        CASE WHEN previous_end_ns IS NULL THEN begin_ns ELSE previous_last_ns END,
+        CASE WHEN previous_end_ns IS NULL THEN first_ns - 1 ELSE first_ns END
     FROM following
-    WHERE previous_end_ns IS NULL AND NOT is_born
-    UNION ALL
-    SELECT run_id, process_id, previous_last_ns, first_ns
-    FROM following
-    WHERE begin_ns > previous_end_ns
+    WHERE begin_ns > previous_end_ns OR (previous_end_ns IS NULL AND NOT is_born)
 )
 SELECT
     run_id, process_id, start_ns,

@@ -4,14 +4,7 @@
 --     as the one for what comes through the middleware, so that it is not known what it should
 --     have got.
 -- grain: one row per subscription with a handle
-WITH host_end AS (
-    SELECT
-        host_id,
-        max(last_seen_ns) AS end_ns
-    FROM store.process
-    GROUP BY host_id
-),
-reader AS (
+WITH reader AS (
     SELECT
         r.subscription_id,
         count(*) AS thread_count,
@@ -20,16 +13,6 @@ reader AS (
     FROM derive.subscription_reader AS r
     JOIN store.thread AS t ON r.thread_id = t.thread_id
     GROUP BY r.subscription_id
-),
-successor AS (
-    SELECT
-        subscription_id,
-        lead(created_ns) OVER (
-            PARTITION BY run_id, process_id, subscription_handle
-            ORDER BY created_ns NULLS FIRST, subscription_id
-        ) AS replaced_ns
-    FROM store.subscription
-    WHERE subscription_handle IS NOT NULL
 ),
 -- Before Humble takes have no event of their own.
 showing AS (
@@ -44,14 +27,23 @@ SELECT
     nullif(s.queue_depth, 0) AS queue_depth,
     s.created_ns,
     coalesce(r.last_seen_ns, p.last_seen_ns) AS last_seen_ns,
-    x.replaced_ns,
-    e.end_ns AS host_end_ns,
+    CASE
+        WHEN s.subscription_handle IS NOT NULL
+            THEN lead(s.created_ns) OVER (
+                PARTITION BY s.run_id, s.process_id, s.subscription_handle
+                ORDER BY s.created_ns NULLS FIRST, s.subscription_id
+            )
+    END AS replaced_ns,
+    p.host_end_ns,
     CASE WHEN r.thread_count = 1 THEN r.thread_id END AS only_thread_id,
     p.host_id IN (SELECT host_id FROM showing) AS shows_takes
 FROM store.subscription AS s
-JOIN store.process AS p ON s.process_id = p.process_id
+JOIN (
+    SELECT
+        process_id, host_id, last_seen_ns,
+        max(last_seen_ns) OVER (PARTITION BY host_id) AS host_end_ns
+    FROM store.process
+) AS p ON s.process_id = p.process_id
 JOIN store.host AS h ON p.host_id = h.host_id
-LEFT JOIN host_end AS e ON p.host_id = e.host_id
 LEFT JOIN reader AS r ON s.subscription_id = r.subscription_id
-LEFT JOIN successor AS x ON s.subscription_id = x.subscription_id
-WHERE NOT coalesce(s.is_inferred AND s.rmw_handle IS NULL, false)
+QUALIFY NOT coalesce(s.is_inferred AND s.rmw_handle IS NULL, false)

@@ -50,7 +50,7 @@ delivered AS (
         min(t.taken_ns) AS taken_ns
     FROM store.link_transport AS l
     JOIN store.take AS t ON l.take_id = t.take_id
-    WHERE l.run_id = only_run AND l.is_copy IS NOT TRUE
+    WHERE l.run_id = only_run AND NOT l.is_copy
     GROUP BY l.publication_id, l.subscription_id
 ),
 message AS MATERIALIZED (
@@ -105,10 +105,7 @@ missing AS MATERIALIZED (
         )
     QUALIFY taken_ns IS NULL
 ),
-gap AS MATERIALIZED (
-    SELECT process_id, start_ns, covered_until_ns
-    FROM derive.process_gap(only_run, has_gaps, has_pauses)
-),
+gap AS MATERIALIZED (FROM derive.process_gap(only_run, has_gaps, has_pauses)),
 -- Takes that could be any message, and those that could be one without a stamp.
 unidentified AS (
     SELECT

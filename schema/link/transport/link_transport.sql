@@ -22,21 +22,32 @@ WITH link AS (
 ),
 -- Most runs have none: then no publication or take need be looked up.
 doubtful AS MATERIALIZED (
-    SELECT run_id, publication_id, take_id
+    SELECT publication_id, take_id
     FROM link
     WHERE method NOT IN ('exact', 'agnocast') OR candidate_count > 1
 ),
+-- When a gap may hide a better candidate, in the trace of the sender and in that of the receiver.
 guess AS (
     SELECT
-        l.run_id, l.take_id,
-        b.trace_id AS sender_trace_id,
-        t.trace_id AS receiver_trace_id,
-        b.start_ns AS sent_ns,
-        CASE WHEN bh.clock_id = th.clock_id THEN greatest(b.end_ns, t.taken_ns) ELSE b.end_ns END
-            AS sent_until_ns,
-        CASE WHEN bh.clock_id = th.clock_id THEN least(b.start_ns, t.taken_ns) ELSE t.taken_ns END
-            AS received_from_ns,
-        t.taken_ns
+        l.take_id,
+        unnest([
+            {
+                'trace_id': b.trace_id,
+                'from_ns': b.start_ns,
+                'until_ns': CASE
+                    WHEN bh.clock_id = th.clock_id THEN greatest(b.end_ns, t.taken_ns)
+                    ELSE b.end_ns
+                END
+            },
+            {
+                'trace_id': t.trace_id,
+                'from_ns': CASE
+                    WHEN bh.clock_id = th.clock_id THEN least(b.start_ns, t.taken_ns)
+                    ELSE t.taken_ns
+                END,
+                'until_ns': t.taken_ns
+            }
+        ]) AS side
     FROM doubtful AS l
     JOIN (
         SELECT * FROM store.publication WHERE run_id = only_run AND EXISTS (SELECT 1 FROM doubtful)
@@ -50,34 +61,21 @@ guess AS (
     JOIN store.host AS th ON tp.host_id = th.host_id
     WHERE has_gaps
 ),
-gap AS NOT MATERIALIZED (
-    SELECT recording_id, start_ns, covered_until_ns
-    FROM derive.recording_gap
-    WHERE run_id = only_run
-),
 exposed AS (
-    SELECT u.run_id, u.take_id
-    FROM (
-        SELECT q.*, x.recording_id
-        FROM guess AS q
-        JOIN derive.exposed_trace AS x ON q.sender_trace_id = x.trace_id
-    ) AS u
-    ASOF JOIN gap AS g ON u.recording_id = g.recording_id AND u.sent_until_ns >= g.start_ns
-    WHERE g.covered_until_ns >= u.sent_ns
-    UNION
-    SELECT u.run_id, u.take_id
-    FROM (
-        SELECT q.*, x.recording_id
-        FROM guess AS q
-        JOIN derive.exposed_trace AS x ON q.receiver_trace_id = x.trace_id
-    ) AS u
-    ASOF JOIN gap AS g ON u.recording_id = g.recording_id AND u.taken_ns >= g.start_ns
-    WHERE g.covered_until_ns >= u.received_from_ns
+    SELECT DISTINCT q.take_id
+    FROM guess AS q
+    JOIN derive.exposed_trace AS x ON q.side.trace_id = x.trace_id
+    ASOF JOIN (
+        SELECT recording_id, start_ns, covered_until_ns
+        FROM derive.recording_gap
+        WHERE run_id = only_run
+    ) AS g ON x.recording_id = g.recording_id AND q.side.until_ns >= g.start_ns
+    WHERE g.covered_until_ns >= q.side.from_ns
 ),
 intra_process AS (
-    SELECT DISTINCT publisher_id
+    SELECT publisher_id, process_id
     FROM store.publication
-    WHERE run_id = only_run AND intra_ns IS NOT NULL AND publisher_id IS NOT NULL
+    WHERE run_id = only_run AND intra_ns IS NOT NULL
 ),
 -- rclcpp makes a second callback for what comes out of a buffer. It may never get its turn.
 buffered AS (
@@ -94,7 +92,7 @@ buffered AS (
 repeated AS (
     SELECT l.take_id
     FROM link AS l
-    JOIN intra_process AS i ON l.publisher_id = i.publisher_id
+    SEMI JOIN intra_process AS i ON l.publisher_id = i.publisher_id
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     JOIN store.subscription AS s
         ON l.subscription_id = s.subscription_id AND p.process_id = s.process_id
@@ -110,9 +108,7 @@ silent AS (
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
     JOIN store.subscription AS s
         ON l.subscription_id = s.subscription_id AND p.process_id = s.process_id
-    ANTI JOIN (
-        SELECT process_id FROM store.publication WHERE run_id = only_run AND intra_ns IS NOT NULL
-    ) AS e ON p.process_id = e.process_id
+    ANTI JOIN intra_process AS e ON p.process_id = e.process_id
     SEMI JOIN (
         SELECT c.subscription_id
         FROM store.callback_instance AS i
