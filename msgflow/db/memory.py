@@ -20,8 +20,8 @@ _MOST_DEFAULT_BYTES = 4_000_000_000
 _LEAST_BYTES = 15_000_000
 # DuckDB advises this. With less for each, threads spill more than fewer threads would.
 _BYTES_PER_THREAD = 125_000_000
-# What functions, results and fragmented heaps may take for each byte that DuckDB counts, and at
-# least.
+# What functions, results and fragmented heaps may take besides: a share of the bytes that DuckDB
+# counts, and at least so much.
 _SHARE_BESIDE = 0.25
 _LEAST_BESIDE = 1 << 28
 _EXAMPLE = "MSGFLOW_MEMORY_LIMIT=2GB"

@@ -29,11 +29,11 @@ def on_one_base(
 ) -> tuple[TraceInfo, ...]:
     """Return the descriptions of traces with corrections, so that times of each boot fit together.
 
-    The first trace of programs decides, the kernel's only where there is no other: a kernel trace
-    beside a recording moves no time of it. Only a clock that has a uuid and counts nanoseconds is
-    corrected: without a uuid it is a clock of its own. Two hostnames with one boot id that overlap
-    as recorded, but not after the correction, are two machines (a clone): the clock that would be
-    corrected loses its uuid.
+    The first trace of programs decides. The kernel's decides only where there is no other, so that
+    a kernel trace beside a recording moves no time of the recording. Only a clock that has a uuid
+    and counts nanoseconds is corrected: without a uuid it is a clock of its own. Two hostnames with
+    one boot id that overlap as recorded, but not after the correction, are two machines (a clone):
+    the clock that would be corrected loses its uuid.
 
     `offsets` are what traces opened before decided, in ns since the epoch. The function adds those
     of these traces.

@@ -3,7 +3,7 @@
 --     readers in the process it is not known which of them had it then. In an events executor, the
 --     queue has what its own thread publishes when publish() has returned; of other messages, a
 --     kernel trace shows how the publishing thread woke the middleware's.
--- grain: one row per take of which this is known
+-- grain: one row per take whose message is known to have arrived
 -- when: raw.ros2_caret_on_data_available, staging.executor WHERE kind = 'events'
 
 -- When ROS threads woke the middleware's threads that wake the threads of events executors: how

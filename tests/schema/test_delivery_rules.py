@@ -25,7 +25,8 @@ TABLES = {
     "store.publisher": "publisher_id, created_ns, process_id = 1",
     "derive.copied_pair": "publisher_id, subscription_id",
     "store.link_transport": (
-        "run_id = 1, publication_id, publisher_id = 1, subscription_id = 1, take_id, is_copy = false"
+        "run_id = 1, publication_id, publisher_id = 1, subscription_id = 1, take_id, "
+        "is_copy = false"
     ),
     "store.take": (
         "run_id = 1, take_id, subscription_id = 1, taken_ns, source_timestamp_ns = 1, "

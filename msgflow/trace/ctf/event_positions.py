@@ -99,9 +99,9 @@ def split(layout: StreamLayout, memory: Memory, spans: Sequence[Span]) -> Lanes:
 def guess(layout: StreamLayout, memory: Memory, targets: Integers) -> tuple[Integers, Integers]:
     """Return where events seem to begin behind some bytes, and behind which of them each is.
 
-    From any byte, the sizes of events soon lead to the begin of an event, and from there to begins
-    only; bytes that lead to no event are left out. So most of those that get far enough meet: the
-    median of the places where they arrive is where most are.
+    It takes each byte for the begin of an event, and goes on by the size that it would have. This
+    soon leads to a true begin, and from there to true begins only. So most bytes arrive at the same
+    place, which is the median of all places. Bytes that lead to no event are left out.
     """
     offsets = np.arange(0, LOOKED_AT, layout.known_header.align)
     at = (targets[:, np.newaxis] + offsets).reshape(-1)

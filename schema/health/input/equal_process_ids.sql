@@ -1,7 +1,7 @@
 -- title: Processes had equal ids at one time
 -- description: Processes had the same ids at the same time. They are told apart by their names, or
---     by the sessions that recorded them. A thread with a name of its own, which no main thread
---     has, is of no known process.
+--     by the sessions that recorded them. A thread with a name that no main thread has belongs
+--     to no known process.
 -- cause: Containers number their processes alike, and share a session daemon, or a hostname.
 -- cure: None needed if the processes below are those that ran. To be sure, record the namespace of
 --     the ids: lttng add-context -u -t pid_ns.

@@ -6,7 +6,7 @@
 -- column: change VARCHAR            'longer', 'shorter', 'both' (of different statistics), 'only in
 --     A', 'only in B', 'about equal' (less than matters), 'none shown' (the intervals contain 0),
 --     or why it is not known: 'too few values', 'too few independent values', 'too few resamples'
--- column: of VARCHAR                Statistics of which that is said
+-- column: of VARCHAR                Statistics that changed like this
 -- column: a_median_ns BIGINT [ns]   Median in run A
 -- column: b_median_ns BIGINT [ns]   Median in run B
 -- column: median_percent DOUBLE [%] Change of the median

@@ -50,8 +50,8 @@ counted AS (
             OVER (PARTITION BY o.publisher_id) < 5
 ),
 -- Waits and long callbacks disturb some publications, so only the middle four fifths count. A loop
--- in a busy thread keeps its interval in the middle half: it differs by less than half, and bursts
--- are none. A node that leaves out some messages answers each of that half.
+-- in a busy thread keeps its interval in the middle half: it differs by less than half, so
+-- bursts do not count. A node that leaves out some messages answers each of that half.
 rhythm AS MATERIALIZED (
     SELECT
         publisher_id,

@@ -5,7 +5,7 @@
 --     latest counts that came after the caches were last emptied and did not fire itself.
 --     What a cache held when an output was published is the latest instance of the input's callback
 --     (by effective end) that ended at or before the cut, or nested inside the publishing instance
---     and before the publication. The input whose own instance publishes is none of these. The
+--     and before the publication. The input whose own instance publishes is left out. The
 --     trace does not show when a node reads its caches. So other instances are candidates, too:
 --     those that began before the publication, and ended after the instance in the cache at the cut
 --     began. A firing needs a message of every input: if there was none at the cut, the last of the
@@ -23,7 +23,7 @@ nesting AS (
     FROM store.callback_instance
     WHERE run_id = only_run AND parent_id IS NOT NULL
 ),
--- None are periodic_async: its caches are never emptied.
+-- Only of partial_sync: the caches of periodic_async are never emptied.
 firing AS MATERIALIZED (
     SELECT
         annotation_id, callback_instance_id, first_event_id, last_event_id, emptied_event_id,

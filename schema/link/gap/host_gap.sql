@@ -1,5 +1,5 @@
 -- description: Gaps in what a host recorded of its processes, for ASOF joins as with
---     derive.recording_gap. Those of kernel traces are none.
+--     derive.recording_gap. Gaps of kernel traces do not count.
 -- grain: one row per such gap
 SELECT
     t.run_id, t.host_id, l.start_ns,

@@ -1,7 +1,8 @@
 -- description: What the tracer of Python nodes (msgflow record) says besides the events of rclcpp:
 --     which processes it traces (`python`), which executor a thread works for (`executor`), that
 --     something will go on later because of what runs (`step`), and that the next callback of the
---     thread is what goes on (`resume`). Each is the symbol of a callback that is none.
+--     thread is what goes on (`resume`). The tracer registers a callback that never runs,
+--     whose symbol says it.
 -- grain: one row per such event
 -- when: raw.ros2_rclcpp_callback_register WHERE symbol LIKE '#msgflow %'
 SELECT

@@ -1,7 +1,7 @@
 -- description: What silences of a trace are taken to be like. All numbers that the rules of pauses
 --     know are here, each with its reason.
 CREATE OR REPLACE MACRO staging.pause_limit() AS {
-    -- Nobody stops and starts sooner: each is a command that a daemon passes on to every process.
+    -- A stop and a start are further apart: a daemon passes each command on to every process.
     -- Nor is more time between the streams that one command ends.
     'least_ns': 1000000,
     -- Where a system is often as silent for a while, it is so again within a few times that.

@@ -1,7 +1,7 @@
 -- description: Which goal a request for a result belongs to. The number of the goal is not in the
 --     trace. A request that a thread sent after it took the answer to a goal, in the same turn, is
 --     for that goal (derive.certain_call). Else what counts is which goals of the client are open:
---     accepted, and nobody has asked for their result. While only one is, a request is for that
+--     accepted, and no request asked for their result. While only one is, a request is for that
 --     one. If several are, each request may be for each of them, until all of them were asked for:
 --     these goals are one block. In it, the order pairs goals and requests, so that the number of
 --     goals that are still worked on is right, but not which.

@@ -20,7 +20,7 @@ run AS (
 ),
 -- What a thread runs is in order, so the instances that overlap a wait are neighbours: from the one
 -- that was under way when the wait began, or the one before it, to the last that began before its
--- end. There are none, as a rule, where the last one was over when the wait began.
+-- end. As a rule, no instance does where the last one was over when the wait began.
 pair AS (
     SELECT
         w.*,

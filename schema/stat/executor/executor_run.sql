@@ -1,6 +1,6 @@
 -- description: The callback instances that occupied threads of executors, numbered on each thread
---     in order of time. Callback instances nested in others are part of those. So the rows of one
---     thread never overlap. Times are those of the executor's clock.
+--     in order of time. A callback instance that is nested in another is part of that one, so the
+--     rows of a thread never overlap. Times are those of the executor's clock.
 -- grain: one row per callback instance that is not nested in another
 SELECT
     i.run_id, x.executor_id, i.thread_id, i.callback_id, i.callback_instance_id, i.start_ns,

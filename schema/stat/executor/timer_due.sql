@@ -56,7 +56,7 @@ followed AS (
         callback_id, slice, next_slice,
         CASE
             WHEN late[2] - late[1] <= slack_ns AND abs(late[1] - usual_ns) <= slack_ns THEN
-                -- So little is no drift: the grid stays exact where there is none.
+                -- Without a drift the difference is this small, and the grid stays exact.
                 CASE WHEN abs(moved_ns + late[1] - usual_ns) > slack_ns // 10
                     THEN moved_ns + late[1] - usual_ns ELSE 0 END
             ELSE moved_ns
