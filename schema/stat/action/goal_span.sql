@@ -1,5 +1,5 @@
 -- description: From when to when an action server was concerned with a goal that it accepted, or
---     may have: from its answer until it sent the result; without an end if no client asked for that.
+--     may have: from its answer until it sent the result; without an end if no client asked for it.
 --     Clients that ask late get it late. Of goals whose results cannot be told apart, the ends are
 --     those of all, in some order. A result of a goal that the server was not seen to take is of
 --     one that began in a gap of the server's host, or before the recording: the last gap before
