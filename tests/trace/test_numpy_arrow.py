@@ -129,7 +129,7 @@ def test_a_batch_without_rows() -> None:
 
 
 @pytest.mark.thorough
-def test_an_ingest_and_a_query_import_nothing_that_takes_long(tmp_path: Path) -> None:
+def test_an_ingest_a_query_and_a_report_import_nothing_that_takes_long(tmp_path: Path) -> None:
     """pandas, where it is installed, takes longer than reading a small trace."""
     simulate("pipeline", tmp_path / "trace", factor=0.02)
     script = (
@@ -145,5 +145,6 @@ def test_an_ingest_and_a_query_import_nothing_that_takes_long(tmp_path: Path) ->
         ["query", "e2e-latency"],
         ["query", "flows", "--limit", "3", "--format", "csv"],
         ["export", "csv", "-o", tmp_path / "tables"],
+        ["report", "-o", tmp_path / "report.html"],
     ):
         subprocess.run([sys.executable, "-c", script, *command, *database], check=True)
