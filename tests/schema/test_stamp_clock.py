@@ -124,6 +124,41 @@ def test_messages_taken_elsewhere_tell_where_a_clock_was_set_if_they_fit_no_othe
     assert len(lines(rules)) == lines_known
 
 
+def test_what_fits_a_drift_and_a_small_step_has_the_slack_of_both(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """Each message allows 30 µs; a clock that is set by 32 µs could as well have drifted."""
+    ((*_, drift, slack),) = record(rules, 0, 32_000, width=30_000)
+    assert (drift > 10_000, slack > 40_000) == (True, True)
+
+
+def test_a_drift_that_no_step_explains_is_known_sharply(rules: duckdb.DuckDBPyConnection) -> None:
+    ((*_, drift, slack),) = record(rules, ppm=20, count=1_600, width=30_000)
+    assert (abs(drift - 20_000) < 1_000, slack) == (True, 0)
+
+
+@pytest.mark.parametrize("back", [1, 2])
+def test_stamps_of_two_times_are_not_certain(rules: duckdb.DuckDBPyConnection, back: int) -> None:
+    """The clock is set back while recording: stamps of some seconds are made twice."""
+    for _, end, difference, *_ in record(rules, 0, -back * SECOND - 3_000_000, count=800):
+        if abs(difference) < 1_500:
+            assert end is not None
+            assert end < (4 - back) * SECOND
+
+
+def test_where_a_message_was_published_shows_by_takes_on_other_clocks(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """A clock was set by more than the publications that are looked at beside a stamp."""
+    record(rules, clock_id=2, count=800)
+    rules.execute("UPDATE message SET taken_ns = taken_ns + 7000000000")
+    rules.execute(
+        "UPDATE message SET source_timestamp_ns = source_timestamp_ns + 1003000000 "
+        "WHERE source_timestamp_ns > 4000000000"
+    )
+    assert [round(line[2], -4) for line in lines(rules)] == [0, 1_003_000_000]
+
+
 @pytest.mark.parametrize("by", [-PERIOD, PERIOD])
 def test_a_clock_that_is_set_by_a_period_is_not_known_as_before(
     rules: duckdb.DuckDBPyConnection, by: int

@@ -91,7 +91,7 @@ told AS (
         coalesce(l.agrees, false)
         AND (
             min(l.segment) OVER on_clock = max(l.segment) OVER on_clock
-            OR c.share >= derive.clock_limit().unmixed_share * median(c.share) OVER on_clock
+            OR c.share >= derive.clock_limit().unmixed_share * max(c.share) OVER on_clock
         ) AS agrees
     FROM course AS c
     LEFT JOIN derive.stamp_line('pair', 'divided') AS l

@@ -2,7 +2,7 @@
 --     most of its messages allow. The clocks of one boot run at one rate (clock_gettime(2)), so no
 --     drift is tried too. A stretch agrees with the line if the line explains nearly as many of its
 --     messages as any difference does. Where other differences explain nearly as many messages of
---     the segment, the slack reaches to the farthest of them. Where no drift explains a third of
+--     the segment, the slack reaches to the farthest of them. Where no drift explains half of
 --     the time, the clock may have been set by a little in place of it.
 -- grain: one row per row of the course
 -- param: pairs VARCHAR  Name of rows as of derive.stamp_pair
@@ -84,7 +84,7 @@ chosen AS (
         j.clock_id,
         arg_max(j.place, (j.agreeing_count, l.vote_count, -j.place)) AS place,
         any_value(j.duration_ns) AS duration_ns,
-        3 * max(j.agreeing_count) FILTER (l.drift_ppb = 0) >= any_value(j.stretch_count)
+        2 * max(j.agreeing_count) FILTER (l.drift_ppb = 0) >= any_value(j.stretch_count)
             AS may_be_set
     FROM (
         SELECT

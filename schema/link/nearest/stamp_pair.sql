@@ -15,18 +15,42 @@ WITH published AS MATERIALIZED (
     FROM derive.unstamped_publication(only_run)
     WINDOW in_order AS (PARTITION BY publisher_id ORDER BY written_ns, publication_id)
 ),
-heard AS (
+taken AS MATERIALIZED (
     SELECT
-        p.clock_id, p.publisher_id, m.source_timestamp_ns, m.only_subscription_id,
-        min(CASE WHEN m.clock_id = p.clock_id THEN m.taken_ns END) AS taken_ns
+        p.clock_id, p.publisher_id, m.source_timestamp_ns, m.only_subscription_id, m.taken_ns,
+        m.clock_id AS taken_clock_id
     FROM derive.unstamped_message(only_run) AS m
     JOIN (SELECT DISTINCT clock_id, topic_name, publisher_id FROM published) AS p
         ON m.topic_name = p.topic_name
-    GROUP BY p.clock_id, p.publisher_id, m.source_timestamp_ns, m.only_subscription_id
+),
+-- How far another clock is from this one: the least time from stamp to take, in the beginning.
+apart AS (
+    SELECT
+        clock_id, taken_clock_id,
+        min(taken_ns - source_timestamp_ns) AS apart_ns
+    FROM (
+        SELECT clock_id, taken_clock_id, taken_ns, source_timestamp_ns
+        FROM taken
+        QUALIFY row_number() OVER (PARTITION BY clock_id, taken_clock_id ORDER BY taken_ns)
+            <= derive.clock_limit().stretch_messages
+    )
+    GROUP BY clock_id, taken_clock_id
+),
+heard AS (
+    SELECT
+        t.clock_id, t.publisher_id, t.source_timestamp_ns, t.only_subscription_id,
+        min(CASE WHEN t.taken_clock_id = t.clock_id THEN t.taken_ns END) AS taken_ns,
+        coalesce(
+            min(CASE WHEN t.taken_clock_id = t.clock_id THEN t.taken_ns END),
+            min(t.taken_ns - a.apart_ns)
+        ) AS received_ns
+    FROM taken AS t
+    JOIN apart AS a ON t.clock_id = a.clock_id AND t.taken_clock_id = a.taken_clock_id
+    GROUP BY t.clock_id, t.publisher_id, t.source_timestamp_ns, t.only_subscription_id
 ),
 message AS (
     SELECT
-        clock_id, publisher_id, source_timestamp_ns, taken_ns,
+        clock_id, publisher_id, source_timestamp_ns, taken_ns, received_ns,
         lag(source_timestamp_ns) OVER (
             PARTITION BY publisher_id, only_subscription_id ORDER BY source_timestamp_ns
         ) AS earlier_timestamp_ns,
@@ -48,11 +72,13 @@ numbered AS (
     FROM message
 ),
 sampled AS (
-    SELECT clock_id, publisher_id, source_timestamp_ns, taken_ns, earlier_timestamp_ns, stretch
+    SELECT
+        clock_id, publisher_id, source_timestamp_ns, taken_ns, received_ns, earlier_timestamp_ns,
+        stretch
     FROM numbered
     WHERE stretch % (1 + message_count // (stretch_size * derive.clock_limit().most_stretches)) = 0
 ),
--- A clock that was set is far from that of the trace: a take on the latter tells about when.
+-- A clock that was set is far from that of the trace: a take tells about when.
 placed AS (
     SELECT
         s.clock_id, s.publisher_id, s.stretch, s.source_timestamp_ns, s.taken_ns,
@@ -63,7 +89,7 @@ placed AS (
     FROM (
         SELECT
             *,
-            unnest([source_timestamp_ns, taken_ns]) AS near_ns
+            unnest([source_timestamp_ns, received_ns]) AS near_ns
         FROM sampled
     ) AS s
     ASOF JOIN published AS p ON s.publisher_id = p.publisher_id AND s.near_ns >= p.written_ns
