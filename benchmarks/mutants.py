@@ -67,8 +67,7 @@ FINDINGS = (
 )
 # Rules about messages that are matched by time, with cases of their own.
 NEAREST = (
-    "agreed_difference", "certain_clock", "clock_drift", "clock_step", "close_pair",
-    "publication_beside_gap", "sharp_difference", "standing_difference", "unstamped_call",
+    "agreed_difference", "clock_drift", "clock_step", "publication_beside_gap", "unstamped_call",
     "unstamped_message", "unstamped_publication",
 )  # fmt: skip
 # No finding of the input says that it found nothing.

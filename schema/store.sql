@@ -655,19 +655,18 @@ CREATE TABLE store.clock_uncertainty (
     uncertainty_ns BIGINT NOT NULL  -- Bound of the error of the correction at that moment [ns]
 );
 
--- One row per stretch of time in which stamps run along a clock of the traces
+-- One row per time between two steps of the clock that stamps messages, where its course is certain
 CREATE TABLE store.stamp_clock (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     clock_id BIGINT NOT NULL,  -- Clock of the traces {to clock}
-    at_ns BIGINT NOT NULL,  -- Middle of the stretch, time of the traces [epoch ns]
-    start_ns BIGINT NOT NULL,  -- Begin of the stretch [epoch ns]
-    end_ns BIGINT NOT NULL,  -- End of the stretch, exclusive [epoch ns]
+    start_ns BIGINT,  -- First stamp of the time, by the clock of ROS; NULL: from the begin [epoch
+        -- ns]
+    end_ns BIGINT,  -- Last stamp; NULL: until the end [epoch ns]
+    at_ns BIGINT NOT NULL,  -- Stamp at which the difference holds [epoch ns]
     difference_ns BIGINT NOT NULL,  -- Clock of ROS less clock of the traces, with the shortest
         -- delay of a stamp [ns]
-    drift_ppb BIGINT,  -- Change of the difference in the stretch [ppb]
-    message_count BIGINT,  -- Messages that agree with it
-    segment BIGINT,  -- Number of jumps of the clock before it
-    is_sharp BOOLEAN  -- Publications microseconds apart can be distinguished; NULL: yes
+    drift_ppb BIGINT NOT NULL,  -- How fast the difference changes [ppb]
+    slack_ns BIGINT NOT NULL  -- The messages fit differences that are up to so much apart [ns]
 );
 
 -- One row per publisher

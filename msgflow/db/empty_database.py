@@ -15,7 +15,7 @@ from pathlib import Path
 import duckdb
 
 from msgflow.db import objects
-from msgflow.db.sandbox import STORAGE_VERSION, open_file
+from msgflow.db.sandbox import BLOCK_BYTES, STORAGE_VERSION, open_file
 from msgflow.db.store_table import store_file
 from msgflow.db.transaction import transaction
 from msgflow.errors import UsageError
@@ -75,6 +75,7 @@ def _cache(content: bytes) -> None:
 def _cache_file() -> Path:
     given = os.environ.get("XDG_CACHE_HOME")
     root = Path(given) if given and os.path.isabs(given) else Path("~/.cache").expanduser()
-    made_by = (__version__, objects.head_revision(), objects.definition_hash(), STORAGE_VERSION)
+    made_as = (STORAGE_VERSION, str(BLOCK_BYTES))
+    made_by = (__version__, objects.head_revision(), objects.definition_hash(), *made_as)
     key = hashlib.sha256("\0".join(made_by).encode()).hexdigest()[:32]
     return root / "msgflow" / f"database-{duckdb.__version__}-{key}"

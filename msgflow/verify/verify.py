@@ -10,6 +10,7 @@ from functools import cache
 from operator import eq
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pyarrow as pa
 
 from msgflow.files.default_files import DEFAULT_PATHS
@@ -22,6 +23,7 @@ from msgflow.run.slice import Slice
 from msgflow.sql.header import Param
 from msgflow.sql.statement import internal_sql, registered
 from msgflow.text.name_suggestions import did_you_mean
+from msgflow.trace.numpy_arrow import integers_to_arrow, texts_to_arrow, to_arrow
 from msgflow.verify.condition import format_value
 from msgflow.verify.junit import junit_xml
 from msgflow.verify.metrics import ENDS, KEYS, PATH, SUBJECTS
@@ -123,15 +125,31 @@ def verify(
         for row in work.rows(target, vanished.get(place))
     ]
     header = replace(internal_sql().header("requirement_verdict"), name="verify")
-    types = {"VARCHAR": pa.string(), "DOUBLE": pa.float64(), "BIGINT": pa.int64()}
-    schema = pa.schema([(column.name, types[column.type]) for column in header.columns])
-    with registered(connection, judged=pa.Table.from_pylist(rows, schema=schema)):
+    judged = pa.table(
+        {
+            column.name: _column([row.get(column.name) for row in rows], column.type)
+            for column in header.columns
+        }
+    )
+    with registered(connection, judged=judged):
         table = internal_sql().run(connection, "requirement_verdict", {}).to_arrow_table()
     notes = list(work.notes)
     lost = connection.execute(_LOST, {"run_id": one.run_id}).fetchall()[0][0]
     if lost:
         notes.append(f"the trace lost {lost:,} events, so that values may be wrong: msgflow check")
     return Verification(QueryResult(table, header, (one,), notes), one, str(targets.file.path))
+
+
+def _column(values: Sequence[Any], sql_type: str) -> pa.Array:
+    """Return values as a column of a type of SQL."""
+    match sql_type:
+        case "VARCHAR":
+            return texts_to_arrow(values)
+        case "BIGINT":
+            return integers_to_arrow(values, pa.int64())
+        case _:
+            numbers = np.array(values, np.float64)
+            return to_arrow(numbers, np.isnan(numbers))
 
 
 @dataclass

@@ -24,6 +24,7 @@ from msgflow.run.window import WHOLE, Window
 from msgflow.sql.statement import internal_sql
 from msgflow.sql.value import Value
 from msgflow.text.shell import shell_joined
+from msgflow.trace.numpy_arrow import integers_to_arrow, texts_to_arrow
 from msgflow.view import summary
 from msgflow.view.page_query import Params, Question, Scratch, page_query, run_page_query
 from msgflow.view.sql_page import examples, words
@@ -195,9 +196,10 @@ def _area(_: Pages, asked: Question) -> bytes:
 
 def _finding(_: Pages, asked: Question) -> bytes:
     findings = [asdict(found) for found in read_findings(asked.connection, [asked.run.run_id])]
-    fields = ("name", "severity", "title", "subject", "count", "detail", "description",
-              "cause", "cure")  # fmt: skip
-    table = pa.table({field: [found[field] for found in findings] for field in fields})
+    texts = ("name", "severity", "title", "subject", "detail", "description", "cause", "cure")
+    columns = {name: texts_to_arrow([found[name] for found in findings]) for name in texts}
+    counts = integers_to_arrow([found["count"] for found in findings], pa.int64())
+    table = pa.table({**columns, "count": counts})
     # A note does not repeat what a finding says.
     is_said = any(found["name"] in _OF_CLOCKS for found in findings)
     notes = [] if is_said else clock_notes(asked.connection, [asked.run])

@@ -29,6 +29,7 @@ from msgflow.sql.value import Value
 from msgflow.text.markdown import code, code_lines, markdown_line, rule_line
 from msgflow.text.shell import shell_joined
 from msgflow.text.values import format_cell
+from msgflow.trace.numpy_arrow import integers_to_arrow
 from msgflow.verify.verify import Verification
 from msgflow.view.page_query import Question
 from msgflow.view.table_encoding import encode_result
@@ -152,7 +153,7 @@ def blame_section(asked: Question, flows: Sequence[tuple[str, str, int]]) -> Sec
         given: dict[str, Value] = {"from": [first], "to": [last], "take": take, "by": "node"}
         result = run_query(asked.connection, header, given, asked.slice)
         table = result.table
-        ranks = pa.array([rank] * len(result), pa.int64())
+        ranks = integers_to_arrow([rank] * len(result), pa.int64())
         results.append(table.set_column(table.column_names.index("rank"), "rank", ranks))
         command = ["msgflow", "flow", "--take", str(take), "--why", "--from", first]
         commands.append(shell_joined([*command, "--case", "first", "--by", "node"]))

@@ -21,7 +21,7 @@ from pyarrow import compute
 
 from msgflow.result.query_result import QueryResult
 from msgflow.text.values import format_cell, printable
-from msgflow.trace.numpy_arrow import is_valid, to_numpy
+from msgflow.trace.numpy_arrow import is_valid, texts_to_arrow, to_numpy
 
 LARGEST_EXACT = 2**53
 _EPOCH = "epoch ns"
@@ -40,7 +40,9 @@ def encode(
     columns = []
     buffers: list[bytes] = []
     for name in table.column_names:
-        column = table[name].combine_chunks()
+        # pyarrow makes an array of no chunks in a way that imports pandas.
+        empty = pa.nulls(0, table.schema.field(name).type)
+        column = table[name].combine_chunks() if table.num_rows else empty
         unit = units.get(name)
         head, body = _column(column, origin_ns if unit == _EPOCH else 0)
         columns.append({"name": name, "unit": unit, **head, "bytes": len(body)})
@@ -77,7 +79,7 @@ def _column(column: pa.Array, origin: int) -> tuple[dict[str, Any], bytes]:
     if pa.types.is_string(kind) or pa.types.is_large_string(kind):
         return _text(column)
     if pa.types.is_map(kind):
-        return _text(pa.array(map(_map_text, column.to_pylist()), pa.string()))
+        return _text(texts_to_arrow([_map_text(value) for value in column.to_pylist()]))
     texts = json.dumps(_shown(column.to_pylist()), ensure_ascii=False, default=str)
     return {"type": "json"}, texts.encode()
 

@@ -10,15 +10,13 @@ from support.rules import derived
 
 RULES = (
     "clock_limit",
+    "stamped_ns",
     "agreed_difference",
     "clock_drift",
+    "stamp_line",
     "followed_difference",
-    "standing_difference",
-    "close_pair",
-    "sharp_difference",
     "stamp_pair",
     "stamp_clock",
-    "certain_clock",
     "clock_step",
     "publication_beside_gap",
     "nearest_message",
@@ -27,21 +25,20 @@ RULES = (
 STAGE = """
 CREATE TABLE published (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
     topic_name VARCHAR DEFAULT '/a', publisher_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
-    publication_id BIGINT, written_ns BIGINT, next_event_ns BIGINT,
-    has_break BOOLEAN DEFAULT false);
+    publication_id BIGINT, written_ns BIGINT, closes_ns BIGINT, goes_on BOOLEAN DEFAULT true);
 CREATE TABLE message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
     source_timestamp_ns BIGINT, only_subscription_id BIGINT DEFAULT 0, clock_id BIGINT DEFAULT 1,
     taken_ns BIGINT);
-CREATE TABLE store.stamp_clock (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1, at_ns BIGINT,
-    start_ns BIGINT, end_ns BIGINT, difference_ns BIGINT DEFAULT 0, drift_ppb BIGINT DEFAULT 0,
-    message_count BIGINT DEFAULT 100, segment BIGINT DEFAULT 0, is_sharp BOOLEAN DEFAULT true);
+CREATE TABLE store.stamp_clock (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
+    start_ns BIGINT, end_ns BIGINT, at_ns BIGINT DEFAULT 0, difference_ns BIGINT DEFAULT 0,
+    drift_ppb BIGINT DEFAULT 0, slack_ns BIGINT DEFAULT 0);
 CREATE TABLE derive.exposed_trace (trace_id BIGINT, recording_id BIGINT);
 INSERT INTO derive.exposed_trace VALUES (1, 7);
 CREATE TABLE derive.recording_gap (run_id BIGINT DEFAULT 1, recording_id BIGINT DEFAULT 7,
     start_ns BIGINT, covered_until_ns BIGINT);
 CREATE VIEW store.publication AS
     SELECT publication_id, 1 AS trace_id, written_ns AS start_ns, written_ns AS end_ns,
-        next_event_ns FROM published;
+        closes_ns AS next_event_ns FROM published;
 CREATE MACRO derive.unstamped_publication(only_run) AS TABLE FROM published WHERE run_id = only_run;
 CREATE MACRO derive.unstamped_message(only_run) AS TABLE FROM message WHERE run_id = only_run;
 """

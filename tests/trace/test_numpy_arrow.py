@@ -129,7 +129,7 @@ def test_a_batch_without_rows() -> None:
 
 
 @pytest.mark.thorough
-def test_an_ingest_and_a_query_import_nothing_that_takes_long(tmp_path: Path) -> None:
+def test_commands_import_nothing_that_takes_long(tmp_path: Path) -> None:
     """pandas, where it is installed, takes longer than reading a small trace."""
     simulate("pipeline", tmp_path / "trace", factor=0.02)
     script = (
@@ -139,11 +139,15 @@ def test_an_ingest_and_a_query_import_nothing_that_takes_long(tmp_path: Path) ->
         "finally:\n"
         "    assert not {'pandas', 'numpy.ma'} & set(sys.modules)"
     )
+    targets = tmp_path / "targets.yaml"
+    targets.write_text("targets:\n  - topic: '*'\n    loss: < 100 %\n", encoding="utf-8")
     database = ["--db", tmp_path / "run.duckdb"]
     for command in (
         ["ingest", tmp_path / "trace"],
         ["query", "e2e-latency"],
         ["query", "flows", "--limit", "3", "--format", "csv"],
         ["export", "csv", "-o", tmp_path / "tables"],
+        ["report", "-o", tmp_path / "report.html"],
+        ["verify", targets],
     ):
         subprocess.run([sys.executable, "-c", script, *command, *database], check=True)

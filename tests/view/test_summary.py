@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from support.hostile import HOSTILE, renamed
-from support.served import Page, shown
+from support.served import Page, Served, shown
 from support.thorough import few
 from typer.testing import CliRunner
 
@@ -22,6 +22,7 @@ from msgflow.view.pages import SUMMARY, Pages
 from msgflow.view.summary import Section, query_section
 
 Report = Callable[..., str]
+Serve = Callable[[Path], Served]
 _TARGETS = "targets:\n  - topic: '*'\n    loss: < 1 %\n  - topic: /nowhere\n    rate: 1 Hz ± 5 %\n"
 
 
@@ -209,3 +210,16 @@ def test_the_first_page_of_a_report_has_it(
     tabs = page.page.locator(".tabs a").all_inner_texts()
     assert "Timeline" in tabs
     assert "Compare" not in tabs
+
+
+def test_the_server_is_asked_for_what_stands_below_when_somebody_looks(
+    dropping: Path, serve: Serve, page: Page
+) -> None:
+    asked: list[str] = []
+    page.page.on("request", lambda request: asked.append(request.url))
+    page.page.set_viewport_size({"width": 1280, "height": 300})
+    page.open(serve(dropping).address)
+    page.page.get_by_text("msgflow why").wait_for(timeout=60_000)
+    assert not any("part=blame" in url for url in asked)
+    page.page.get_by_role("heading", name="Where the time").scroll_into_view_if_needed()
+    page.page.locator(".blame-nodes").first.wait_for(timeout=60_000)

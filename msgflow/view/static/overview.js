@@ -166,20 +166,26 @@ export class OverviewPage {
         command(table.meta.command),
       ];
     });
-    const others = [
-      ...given.map((one) =>
-        fill(one, async () => summary(await app.fetch("summary", { part: one.part })))
-      ),
-      ...[[drops, "drops"], [threads, "threads"]].map(([place, part]) =>
-        fill(place, async () => summary(await app.inWindow("summary", { part })))
-      ),
-    ];
-    // The page stands without what takes longest.
-    this.complete = Promise.all([
-      fill(why, async () => verdict(await app.inWindow("summary", { part: "why" }))),
-      fill(nodes, async () => blame(await app.inWindow("summary", { part: "blame" }))),
-    ]);
-    await Promise.all([hosts, findings, paths, ...others]);
+    const requirements = given.map((one) =>
+      fill(one, async () => summary(await app.fetch("summary", { part: one.part })))
+    );
+    const verdicts = fill(why, async () => verdict(await app.inWindow("summary", { part: "why" })));
+    const above = Promise.all([hosts, findings, paths, ...requirements]);
+    // The page stands without what takes longest. A server is asked for what stands further below
+    // when somebody looks there: once all above has its height. A page that follows is whole.
+    const isWhole = !app.source.isServed || app.follower;
+    const below = [[nodes, "blame", blame], [drops, "drops", summary], [
+      threads,
+      "threads",
+      summary,
+    ]].map(([place, part, show]) =>
+      fill(place, async () => {
+        if (!isWhole) await Promise.all([above, verdicts]).then(() => seen(place.root));
+        return show(await app.inWindow("summary", { part }));
+      })
+    );
+    this.complete = Promise.all([verdicts, ...below]);
+    await (isWhole ? Promise.all([above, this.complete]) : above);
   }
 
   leave() {}
@@ -194,6 +200,18 @@ function bar(share, name) {
 function section(title) {
   const body = h("div", {}, waiting());
   return { root: h("section", {}, h("h2", {}, title), body), body };
+}
+
+// Resolves when an element is on the screen.
+function seen(element) {
+  return new Promise((resolve) => {
+    const observer = new IntersectionObserver((entries) => {
+      if (!entries.some((entry) => entry.isIntersecting)) return;
+      observer.disconnect();
+      resolve();
+    });
+    observer.observe(element);
+  });
 }
 
 async function fill(place, make) {

@@ -15,7 +15,6 @@ WITH step AS (
         SELECT h.host_id
         FROM store.host AS h
         JOIN store.stamp_clock AS c ON h.clock_id = c.clock_id
-        WHERE c.message_count > 0
     )
 )
 SELECT

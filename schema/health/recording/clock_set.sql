@@ -10,40 +10,35 @@
 -- when: store.stamp_clock
 WITH step AS (
     SELECT
-        *,
-        CASE
-            WHEN lead(start_ns) OVER (PARTITION BY clock_id ORDER BY start_ns) IS NULL
-                THEN 9223372036854775807
-            ELSE end_ns + greatest(before_ns, behind_ns)
-        END AS last_stamp_ns,
-        (SELECT min(start_ns) FROM store.trace WHERE run_id = $run_id) AS begin_ns
-    FROM derive.clock_step($run_id)
+        z.*,
+        (SELECT min(start_ns) FROM store.trace WHERE run_id = $run_id) AS begin_ns,
+        (SELECT max(end_ns) FROM store.trace WHERE run_id = $run_id) AS last_ns
+    FROM derive.clock_step($run_id) AS z
 ),
 missed AS (
-    SELECT
-        z.clock_id, z.segment,
-        count(DISTINCT o.take_id) AS number
-    FROM (
-        SELECT o.take_id, t.source_timestamp_ns, h.clock_id
-        FROM store.orphan_take AS o
-        JOIN store.take AS t ON o.take_id = t.take_id
-        JOIN store.subscription AS s ON o.subscription_id = s.subscription_id
-        JOIN store.publisher AS p ON s.run_id = p.run_id AND s.topic_name = p.topic_name
-        JOIN store.process AS r ON p.process_id = r.process_id
-        JOIN store.host AS h ON r.host_id = h.host_id
-        WHERE o.run_id = $run_id AND o.reason = 'clock_set'
-    ) AS o
-    ASOF JOIN step AS z ON o.clock_id = z.clock_id AND o.source_timestamp_ns <= z.last_stamp_ns
-    GROUP BY z.clock_id, z.segment
+    SELECT DISTINCT o.take_id, t.source_timestamp_ns, h.clock_id
+    FROM store.orphan_take AS o
+    JOIN store.take AS t ON o.take_id = t.take_id
+    JOIN store.subscription AS s ON o.subscription_id = s.subscription_id
+    JOIN store.publisher AS p ON s.run_id = p.run_id AND s.topic_name = p.topic_name
+    JOIN store.process AS r ON p.process_id = r.process_id
+    JOIN store.host AS h ON r.host_id = h.host_id
+    WHERE o.run_id = $run_id AND o.reason = 'clock_set'
 )
 SELECT
-    z.run_id, h.host_id,
-    coalesce(m.number, 0) AS count,
+    any_value(z.run_id) AS run_id,
+    h.host_id,
+    count(m.take_id) AS count,
     printf(
-        '%+.3f ms between %.3f s and %.3f s after recording began',
-        (z.behind_ns - z.before_ns) / 1e6, (z.start_ns - z.begin_ns) / 1e9,
-        (z.end_ns - z.begin_ns) / 1e9
+        '%s between %.3f s and %.3f s after recording began',
+        coalesce(printf('%+.3f ms', (z.behind_ns - z.before_ns) / 1e6), 'by an unknown time'),
+        (coalesce(z.start_ns, z.begin_ns) - z.begin_ns) / 1e9,
+        (coalesce(z.end_ns, z.last_ns) - z.begin_ns) / 1e9
     ) AS detail
 FROM step AS z
 JOIN main.host AS h ON z.clock_id = h.clock_id
-LEFT JOIN missed AS m ON z.clock_id = m.clock_id AND z.segment = m.segment
+LEFT JOIN missed AS m
+    ON z.clock_id = m.clock_id
+    AND coalesce(m.source_timestamp_ns > z.start_ns + z.before_ns, true)
+    AND coalesce(m.source_timestamp_ns < z.end_ns + z.behind_ns, true)
+GROUP BY h.host_id, z.start_ns, z.end_ns, z.before_ns, z.behind_ns, z.begin_ns, z.last_ns

@@ -1,11 +1,12 @@
--- description: The differences of two clocks that may be the right one: those that nearly as many
---     messages allow as the best one. They form ranges without a gap, a row each. In a range, the
---     middle of what most messages allow is furthest from giving a message to another
+-- description: The differences of two clocks that may be the right one: those that a share of the
+--     messages allow that allow the best one. They form ranges without a gap, a row each. In a
+--     range, the middle of what most messages allow is furthest from giving a message to another
 --     publication. If that part is wide, the right difference is near its upper end, because the
 --     shortest delays are short.
 -- grain: one row per clock, stretch of time and stretch of differences
 -- param: intervals VARCHAR  Name of rows of clock_id, stretch, least_ns, greatest_ns
-CREATE OR REPLACE MACRO derive.agreed_difference(intervals) AS TABLE
+-- param: share DOUBLE  Of the messages that allow the best one
+CREATE OR REPLACE MACRO derive.agreed_difference(intervals, share) AS TABLE
 WITH edge AS (
     SELECT
         clock_id, stretch,
@@ -37,7 +38,7 @@ high AS (
     JOIN most AS m
         ON l.clock_id = m.clock_id
         AND l.stretch = m.stretch
-        AND l.vote_count >= derive.clock_limit().rival_share * m.most_count
+        AND l.vote_count >= share * m.most_count
     WHERE l.until_ns > l.from_ns
 ),
 separated AS (

@@ -1,136 +1,121 @@
 -- description: Which of the differences that messages agree with is the right one, from stretch
---     to stretch. The clocks of one machine begin together (a few messages are enough to say so),
---     and then drift: of the differences that a drift can lead to, the one that most messages
---     agree with is taken. If there is none, the clock has jumped, provided that the next two
---     stretches agree (in the last two stretches, nothing is known then). It jumped to the least
---     difference that many messages agree with, since a message is taken, and stamped, soon after
---     it was published; of those within a burst, to the one with most messages, of equal ones to
---     the greatest. If messages were taken on other clocks, nothing says which of several
---     differences is right. If messages taken on this clock could as well be those of later
---     publications, the clock may have jumped by a period, and nothing is known.
--- grain: one row per clock and stretch of time; message_count is 0 where nothing is known
--- param: regions VARCHAR  Rows as of derive.agreed_difference, is_taken_here, stretch_ns
+--     to stretch: the nearest to that of the stretch before. The clocks of one machine begin
+--     together. Where no drift leads from one to the next, not even from the begin of one to the
+--     end of the other, the clock was set, to the least difference if messages were taken on it: a
+--     message is taken, and stamped, soon after it was published. If these could as well be those
+--     of much later publications, it may have been set by a period. Where publications were lost,
+--     messages agree with greater differences. If half of the messages agree with the difference
+--     of before, some stretches say nothing; else, where all do again, the line of the last time
+--     that lasted is right.
+-- grain: one row per row of the course of a clock: stretch of time in which messages agree
+-- param: regions VARCHAR  Rows as of derive.agreed_difference, start_ns, end_ns, is_taken_here,
+--     is_rival: nine tenths of the messages agree, else half of them
 CREATE OR REPLACE MACRO derive.followed_difference(regions) AS TABLE
-WITH RECURSIVE preferred AS (
+WITH RECURSIVE region AS MATERIALIZED (
     SELECT
-        clock_id, stretch, difference_ns, wander_ns,
-        lead(difference_ns, 1) OVER on_clock AS next_ns,
-        lead(stretch, 1) OVER on_clock - stretch + 1 AS until_next,
-        lead(difference_ns, 2) OVER on_clock AS later_ns,
-        lead(stretch, 2) OVER on_clock - stretch + 1 AS until_later
-    FROM (
-        SELECT
-            clock_id, stretch,
-            any_value(wander_ns) AS wander_ns,
-            max({'votes': vote_count, 'difference_ns': difference_ns}).difference_ns
-                AS difference_ns
-        FROM (
-            SELECT
-                clock_id, stretch, difference_ns, vote_count, most_count, is_taken_here,
-                stretch_ns::DOUBLE * derive.clock_limit().drift_ppb / 1e9 AS wander_ns,
-                min(difference_ns) OVER in_stretch + derive.clock_limit().burst_ns AS first_ns,
-                max(difference_ns) OVER in_stretch AS last_ns
-            FROM query_table(regions)
-            WINDOW in_stretch AS (PARTITION BY clock_id, stretch)
-        )
-        WHERE most_count >= derive.clock_limit().quorum
-            AND difference_ns <= first_ns
-            AND (is_taken_here OR last_ns <= first_ns)
-        GROUP BY clock_id, stretch
-    )
-    WINDOW on_clock AS (PARTITION BY clock_id ORDER BY stretch)
+        *,
+        NOT is_taken_here
+        OR difference_ns
+        <= min(difference_ns) FILTER (is_rival) OVER in_stretch + derive.clock_limit().burst_ns
+            AS is_soon,
+        max(difference_ns) FILTER (is_rival) OVER in_stretch
+        - min(difference_ns) FILTER (is_rival) OVER in_stretch
+        <= derive.clock_limit().burst_ns AS is_alone,
+        dense_rank() OVER (PARTITION BY clock_id ORDER BY stretch) AS number
+    FROM query_table(regions)
+    WINDOW in_stretch AS (PARTITION BY clock_id, stretch)
+    QUALIFY is_rival OR is_soon
 ),
-ballot AS MATERIALIZED (
-    SELECT
-        r.clock_id, r.stretch,
-        row_number() OVER (PARTITION BY r.clock_id ORDER BY r.stretch) AS number,
-        any_value(r.stretch_ns)::DOUBLE * derive.clock_limit().drift_ppb / 1e9 AS wander_ns,
-        CASE WHEN any_value(r.is_taken_here)
-            THEN min(r.difference_ns) + derive.clock_limit().burst_ns END AS latest_ns,
-        any_value(r.most_count) AS most_count,
-        list(
-            struct_pack(
-                vote_count := r.vote_count,
-                difference_ns := r.difference_ns,
-                least_ns := r.least_ns,
-                greatest_ns := r.greatest_ns
-            )
-        ) AS regions,
-        any_value(
-            CASE
-                WHEN coalesce(abs(t.next_ns - t.difference_ns) <= t.until_next * t.wander_ns, true)
-                    AND coalesce(
-                        abs(t.later_ns - t.difference_ns) <= t.until_later * t.wander_ns, true
-                    )
-                    THEN t.difference_ns
-            END
-        ) AS jump_ns,
-        -- Behind the last two stretches there are no two that could agree. In a recording of only
-        -- two stretches a clock may begin there all the same.
-        any_value(t.later_ns) IS NOT NULL AS has_later,
-        count(*) OVER (PARTITION BY r.clock_id) <= 2 AS is_short
-    FROM query_table(regions) AS r
-    LEFT JOIN preferred AS t ON r.clock_id = t.clock_id AND r.stretch = t.stretch
-    GROUP BY r.clock_id, r.stretch
-),
-followed (
-    clock_id, number, stretch, difference_ns, message_count, segment, since_stretch, is_begun
-) AS (
+followed AS (
     SELECT
         clock_id,
-        0::BIGINT,
-        stretch,
-        0::BIGINT,
-        0::BIGINT,
-        0::BIGINT,
-        stretch, false
-    FROM ballot
-    WHERE number = 1
+        0 AS number,
+        NULL::BIGINT AS stretch,
+        {
+            'segment': 0::BIGINT,
+            'number': 0::BIGINT,
+            'stretch_count': derive.clock_limit().sharp_stretches::BIGINT,
+            'difference_ns': 0::BIGINT,
+            'least_ns': 0::BIGINT,
+            'greatest_ns': 0::BIGINT,
+            'start_ns': min(start_ns),
+            'is_soon': true,
+            'is_alone': true
+        } AS near,
+        if(false, near, NULL) AS former
+    FROM region
+    GROUP BY clock_id
     UNION ALL
     SELECT
         clock_id, number, stretch,
-        coalesce(near.difference_ns, jump_ns, previous_ns),
+        arg_min(
+            CASE
+                WHEN is_rival OR NOT is_near
+                    THEN {
+                        'segment':
+                            CASE
+                                WHEN is_return THEN former.segment
+                                WHEN is_near THEN near.segment
+                                ELSE number
+                            END,
+                        'number': number,
+                        'stretch_count':
+                            1 + CASE
+                                WHEN is_return THEN former.stretch_count
+                                WHEN is_near THEN near.stretch_count
+                                ELSE 0
+                            END,
+                        'difference_ns': difference_ns,
+                        'least_ns': least_ns,
+                        'greatest_ns': greatest_ns,
+                        'start_ns': start_ns,
+                        'is_soon': is_soon,
+                        'is_alone': is_alone
+                    }
+                ELSE near
+            END,
+            (
+                NOT is_near OR NOT is_good,
+                NOT is_return,
+                NOT is_near,
+                NOT is_rival,
+                NOT is_soon,
+                abs(difference_ns - near.difference_ns),
+                difference_ns
+            )
+        ),
         CASE
-            WHEN near.difference_ns > latest_ns THEN 0
-            WHEN near IS NOT NULL THEN near.vote_count
-            WHEN jump_ns IS NOT NULL THEN most_count
-            ELSE 0
-        END,
-        CASE WHEN near IS NULL AND jump_ns IS NOT NULL THEN segment + 1 ELSE segment END,
-        CASE WHEN near IS NULL AND jump_ns IS NULL THEN since_stretch ELSE stretch END,
-        is_begun OR near IS NOT NULL OR jump_ns IS NOT NULL
+            WHEN any_value(near.stretch_count) >= derive.clock_limit().sharp_stretches
+                THEN any_value(near)
+            ELSE any_value(former)
+        END
     FROM (
         SELECT
-            b.clock_id, b.number, b.stretch, b.latest_ns, b.most_count,
-            CASE WHEN b.has_later OR b.is_short AND NOT f.is_begun THEN b.jump_ns END
-                AS jump_ns,
-            f.difference_ns AS previous_ns,
-            f.segment, f.since_stretch, f.is_begun,
-            list_max(
-                list_transform(
-                    list_filter(
-                        b.regions,
-                        lambda r: greatest(
-                            r.least_ns - f.difference_ns, f.difference_ns - r.greatest_ns
-                        ) <= (b.stretch - f.since_stretch + 1) * b.wander_ns
-                            AND (
-                                r.vote_count >= derive.clock_limit().quorum
-                                OR NOT f.is_begun
-                                AND f.difference_ns BETWEEN r.least_ns AND r.greatest_ns
-                            )
-                    ),
-                    lambda r: struct_pack(
-                        vote_count := r.vote_count,
-                        closeness := -abs(r.difference_ns - f.difference_ns),
-                        difference_ns := r.difference_ns
-                    )
-                )
-            ) AS near
+            f.near, f.former, r.*,
+            greatest(r.least_ns - f.near.greatest_ns, f.near.least_ns - r.greatest_ns)
+            <= (r.end_ns - f.near.start_ns)::DOUBLE * derive.clock_limit().drift_ppb / 1e9
+            AND (r.is_rival OR r.number - f.near.number <= derive.clock_limit().sharp_stretches)
+                AS is_near,
+            r.is_rival AND CASE WHEN r.is_taken_here THEN r.is_soon ELSE r.is_alone END AS is_good,
+            NOT (is_near AND is_good)
+            AND r.is_rival
+            AND r.is_soon
+            AND coalesce(
+                greatest(r.least_ns - f.former.greatest_ns, f.former.least_ns - r.greatest_ns)
+                <= (r.end_ns - f.former.start_ns)::DOUBLE * derive.clock_limit().drift_ppb / 1e9,
+                false
+            ) AS is_return
         FROM followed AS f
-        JOIN ballot AS b ON f.clock_id = b.clock_id AND f.number + 1 = b.number
+        JOIN region AS r ON f.clock_id = r.clock_id AND f.number + 1 = r.number
     )
+    GROUP BY clock_id, number, stretch
 )
-SELECT f.clock_id, f.stretch, f.difference_ns, f.message_count, f.segment
-FROM followed AS f
-JOIN ballot AS b ON f.clock_id = b.clock_id AND f.number = b.number
-WHERE f.message_count > 0 OR b.most_count >= derive.clock_limit().quorum
+SELECT
+    clock_id,
+    near.segment AS segment,
+    stretch,
+    near.difference_ns AS difference_ns,
+    near.is_soon AS is_soon,
+    near.is_alone AS is_alone
+FROM followed
+WHERE near.number = number AND number > 0
