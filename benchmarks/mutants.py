@@ -65,6 +65,11 @@ FINDINGS = (
     "started_late",
     "stream_ends_early",
 )
+# Kinds of culprits that limits decide of.
+CULPRITS = (
+    "burst", "callback", "late_start", "lock", "lost", "never_matched", "no_cpu", "overload",
+    "service", "stale", "waits",
+)  # fmt: skip
 # Rules about messages that are matched by time, with cases of their own.
 NEAREST = (
     "agreed_difference", "clock_drift", "clock_step", "publication_beside_gap", "unstamped_call",
@@ -164,6 +169,11 @@ RULES = (
     (
         "stat/executor/callback_release.sql",
         ("schema/cases/main.executor_wait", "schema/cases/derive.callback_release"),
+    ),
+    # Limits of what matters: by what they decide.
+    (
+        "internal/why/noticed.sql",
+        ("schema/cases/internal.harm", *(f"schema/cases/culprit.{each}" for each in CULPRITS)),
     ),
     *((f"health/recording/{each}.sql", (f"schema/cases/finding.{each}",)) for each in FINDINGS),
     *(

@@ -1,119 +1,295 @@
 """Whether `msgflow why` names the culprit of a problem that was planted in a robot.
 
-    python benchmarks/planted.py [--python PYTHON] [--only PROBLEM]… [--to DIR]
+    python benchmarks/planted.py [--python PYTHON] [--only PATTERN]… [--to DIR]
+                                 [--keep recordings|databases] [--archives DIR] [--seeds NUMBER]
 
-A robot of ten nodes in eight processes (`robot/`) is recorded for ten seconds, from its start, with
-one problem at a time, with two at once, and with none. `why` is asked without a topic. Its first
-sentence has to name who is to blame, for what, and a number that is true; with two problems, the
-first two sentences, the worse one first; with none, that nothing stands out. What is to blame
-besides is printed. The robot is simulated, with the events of rclcpp, with and without those of the
-kernel. With PYTHON, which has the wheels of ROS 2 (`make planted` installs them), the same robot
-runs on this machine, too, with nodes of rclpy. Without the events of the kernel a process that
-takes the CPU cannot be named: the sentence has to name who suffers, and what would show it. The
-exit code is 1 if a sentence is missing.
+Robots (`robot/`) run with one problem at a time, with two at once, and with none; `why` is asked
+without a topic. Its first headline has to name who is to blame, with callback and function, the
+kind of cause, and a number that is true; with two problems, the first two headlines, the worse one
+first; with none, that nothing stands out. What is blamed besides is printed.
+
+Robots are simulated, with the events of rclcpp: one of ten nodes (`simulated.py`), and twins of the
+drone and the picker with names, periods and durations of ten seeds (`twins.py`). With PYTHON, which
+has the wheels of ROS 2 (`make planted` installs them), four robots of rclpy run on this machine:
+that of ten nodes, the drone, the picker, and the vehicle. They are recorded one after the other,
+with the kernel, and nothing else should run meanwhile. Each recording is asked twice, with the
+events of the kernel and without. Without them, who waits for a lock, a disk, a CPU or the lock of
+the interpreter has to be named, and for how long.
+
+A name of a case is `drone-sometimes-1`, `vehicle-healthy-3` or, of the simulator,
+`picker_rclcpp-burst-7`; PATTERN is of such names (`drone-*`). With `--keep`, recordings in DIR, or
+the databases that were made of them, too, are asked again. Archives are other recordings of these
+robots, `drone-sometimes.tar.xz`, or `k-picker-lock.tar.xz` with the kernel; then nothing else is
+asked.
+
+All first headlines stand in DIR/headlines.md. The exit code is 1 if something is missing.
 """
 
 from __future__ import annotations
 
 import argparse
-import re
 import shutil
+import subprocess
 import sys
 import textwrap
+import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from robot.problems import PAIRS, PROBLEMS, Problem
+from robot.judge import Culprit, Told, missed, told
+from robot.problems import PAIRS, ROBOTS
 from robot.simulated import robot
+from robot.twins import PROBLEMS as TWIN_PROBLEMS
+from robot.twins import twin
 
 from msgflow import Database
 from msgflow.ingest import ingest
-from msgflow_sim import simulate
+from msgflow_sim import Scenario, simulate
 
-if TYPE_CHECKING:
-    Row = dict[str, Any]
+_SECONDS = 12
+_SEEDS = 10
+_HEALTHY = 3
+_WIDTH = 92
+_SIMULATED = "_rclcpp"
 
-_SECONDS = 10
+
+@dataclass(frozen=True)
+class Case:
+    """A robot with what is planted in it.
+
+    Attributes:
+        system: the robot, with `_rclcpp` of the simulator.
+        problems: what is planted, the worst first.
+        number: the seed, or which one of equal recordings.
+        archive: where it is recorded already.
+    """
+
+    system: str
+    problems: tuple[str, ...]
+    number: int = 1
+    archive: Path | None = None
+
+    @property
+    def planted(self) -> str:
+        """What is planted, in words."""
+        return "+".join(self.problems) or "healthy"
+
+    @property
+    def name(self) -> str:
+        """Its name, for a directory and for `--only`."""
+        return f"{self.system}-{self.planted}-{self.number}"
+
+    @property
+    def robot(self) -> str:
+        """Name of its robot."""
+        return self.system.removesuffix(_SIMULATED)
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the simulator makes its recording."""
+        return self.system.endswith(_SIMULATED)
+
+    @property
+    def is_twin(self) -> bool:
+        """Whether a seed chooses its names."""
+        return self.is_simulated and self.robot in TWIN_PROBLEMS
+
+    @property
+    def twin(self) -> tuple[Scenario, list[Culprit]]:
+        """The scenario of its seed, and who is to blame."""
+        return twin(self.robot, next(iter(self.problems), None), self.number)
+
+    @property
+    def culprits(self) -> list[Culprit]:
+        """Who is to blame, the worst first."""
+        if self.is_twin:
+            return self.twin[1]
+        return [ROBOTS[self.robot][name] for name in self.problems]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What `why` says of a recording, what is missing in it, and the CPU that it took."""
+
+    case: Case
+    has_kernel: bool
+    verdict: list[Told]
+    missing: list[str]
+    cpu_seconds: float
+
+    @property
+    def events(self) -> str:
+        """What was recorded, in words."""
+        return "with kernel" if self.has_kernel else "ROS only"
+
+    @property
+    def headline(self) -> str:
+        """The first sentence: that of the worst culprit, before notes."""
+        return (self.accused or self.verdict)[0].headline
+
+    @property
+    def accused(self) -> list[Told]:
+        """Rows that are no notes."""
+        return [row for row in self.verdict if row.has_harm]
+
+    @property
+    def besides(self) -> list[str]:
+        """Who is accused after as many culprits as were planted."""
+        later = self.accused[len(self.case.problems) :]
+        return [f"{row.who} ({row.kind})" for row in later]
 
 
 def main() -> None:
     """Record, ask and compare."""
+    arguments = _arguments()
+    to = arguments.to.resolve()
+    if arguments.archives is None:
+        cases = list(_cases(arguments.seeds, has_rclpy=arguments.python is not None))
+    else:
+        cases = list(_archives(arguments.archives))
+    patterns = arguments.only or ["*"]
+    cases = [case for case in cases if any(fnmatchcase(case.name, one) for one in patterns)]
+    failed = [
+        case
+        for case in cases
+        if not _is_recorded(case, to / case.name, arguments.python, keep=arguments.keep is not None)
+    ]
+    cases = [case for case in cases if case not in failed]
+    answers: list[Answer] = []
+    with ProcessPoolExecutor() as pool:
+        asked = [pool.submit(answer, case, to / case.name, arguments.keep) for case in cases]
+        for one in asked:
+            for each in one.result():
+                answers.append(each)
+                _show(each)
+    table = to / "headlines.md"
+    table.write_text(headlines(answers))
+    bad = sum(bool(each.missing) for each in answers) + len(failed)
+    slowest = max((each.cpu_seconds for each in answers), default=0)
+    print(f"{bad} of {len(answers) + len(failed)} answers do not name what was planted — {table}")
+    print(f"an answer took up to {slowest:.1f} s of CPU")
+    sys.exit(1 if bad else 0)
+
+
+def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--python", type=Path, help="Python with rclpy: run the robot, too")
-    parser.add_argument("--only", action="append", help="problems, with + between; all when none")
+    parser.add_argument("--python", type=Path, help="Python with rclpy: run robots, too")
+    parser.add_argument("--only", action="append", help="patterns of names; all when none")
     parser.add_argument(
         "--to",
         type=Path,
         default=Path("build/planted"),
-        help="directory for a folder of each recording, which replaces that of an earlier run",
+        help="directory for a folder of each case, which replaces that of an earlier run",
     )
-    arguments = parser.parse_args()
-    planted = [tuple(one.split("+")) for one in arguments.only or ()]
-    bad = 0
-    for names in planted or [("healthy",), *((name,) for name in PROBLEMS), *PAIRS]:
-        problems = [name for name in names if name != "healthy"]
-        directory = arguments.to.resolve() / "+".join(names)
-        for system, has_kernel, database in _recorded(problems, directory, arguments.python):
-            with Database(database) as opened:
-                verdict = opened.why().verdict.table.to_pylist()
-            missing = list(missed(problems, verdict, has_kernel=has_kernel))
-            bad += bool(missing)
-            print(f"{'MISSED' if missing else 'named':6}  {system:17} {' and '.join(names)}")
-            for row in verdict:
-                lines = textwrap.wrap(row["sentence"], 92)
-                print(textwrap.indent("\n".join(lines), " " * 8), flush=True)
-    print(f"{bad} of the answers do not name what was planted")
-    sys.exit(1 if bad else 0)
+    parser.add_argument(
+        "--keep", choices=("recordings", "databases"), help="what of an earlier run is asked again"
+    )
+    parser.add_argument("--archives", type=Path, help="directory of other recordings")
+    parser.add_argument("--seeds", type=int, default=_SEEDS, help="twins of each problem")
+    return parser.parse_args()
 
 
-def _recorded(
-    problems: Sequence[str], directory: Path, python: Path | None
-) -> Iterator[tuple[str, bool, Path]]:
-    """Yield how it was recorded, whether with the kernel, and the database."""
+def _cases(seeds: int, *, has_rclpy: bool) -> Iterator[Case]:
+    for problems in ((), *((name,) for name in ROBOTS["robot"]), *PAIRS["robot"]):
+        yield Case(f"robot{_SIMULATED}", problems)
+    for name, planted in TWIN_PROBLEMS.items():
+        for problem, seed in product((None, *planted), range(1, seeds + 1)):
+            yield Case(f"{name}{_SIMULATED}", (problem,) if problem else (), seed)
+    if not has_rclpy:
+        return
+    for name, culprits in ROBOTS.items():
+        for number in range(1, _HEALTHY + 1):
+            yield Case(name, (), number)
+        for problems in (*((problem,) for problem in culprits), *PAIRS[name]):
+            yield Case(name, problems)
+
+
+def _archives(directory: Path) -> Iterator[Case]:
+    for archive in sorted(directory.glob("*.tar.xz")):
+        name, _, planted = archive.name.removesuffix(".tar.xz").removeprefix("k-").partition("-")
+        problems = () if planted == "healthy" else tuple(planted.split("+"))
+        yield Case(name, problems, archive=archive)
+
+
+def _is_recorded(case: Case, directory: Path, python: Path, *, keep: bool) -> bool:
+    """Record a robot of rclpy, unless its recording is kept; tell whether there is one."""
+    from recording.recorder import record_launched
+
+    has_recording = keep and (directory / "trace" / "ust").is_dir()
+    if case.is_simulated or case.archive is not None or has_recording:
+        return True
+    begin = time.monotonic()
+    _empty(directory)
+    try:
+        record_launched(python, case.robot, case.problems, _SECONDS, directory)
+    except subprocess.SubprocessError as error:
+        print(f"NOT RECORDED {case.name}: {error}", flush=True)
+        return False
+    print(f"recorded {case.name} in {time.monotonic() - begin:.0f} s", flush=True)
+    return True
+
+
+def answer(case: Case, directory: Path, keep: str | None) -> list[Answer]:
+    """Ask why of a recording, with the events of the kernel and without."""
+    trace = directory / "trace"
+    if case.is_simulated and not (keep and trace.is_dir()):
+        _empty(directory)
+        scenario = case.twin[0] if case.is_twin else robot(case.problems)
+        simulate(scenario, trace, seed=case.number)
+    if case.archive is not None:
+        traces = {case.archive.name.startswith("k-"): case.archive}
+    else:
+        of_host = trace / "robot" if case.is_simulated else trace
+        traces = {True: of_host, False: of_host / "ust"}
+    return [_asked(case, directory, keep, *one) for one in traces.items()]
+
+
+def _asked(case: Case, directory: Path, keep: str | None, has_kernel: bool, trace: Path) -> Answer:
+    directory.mkdir(parents=True, exist_ok=True)
+    database = directory / ("kernel.duckdb" if has_kernel else "ros.duckdb")
+    if keep != "databases" or not database.exists():
+        database.unlink(missing_ok=True)
+        ingest([trace], database)
+    with Database(database) as opened:
+        begin = time.process_time()
+        verdict = told(opened.why().verdict.table.to_pylist())
+        cpu_seconds = time.process_time() - begin
+    missing = list(missed(case.culprits, verdict, has_kernel=has_kernel))
+    return Answer(case, has_kernel, verdict, missing, cpu_seconds)
+
+
+def _empty(directory: Path) -> None:
     if directory.exists():
         shutil.rmtree(directory)
-    simulate(robot(problems), directory / "simulated")
-    simulated = directory / "simulated" / "robot"
-    traces = [("rclcpp and kernel", True, simulated), ("rclcpp", False, simulated / "ust")]
-    if python is not None:
-        from recording.recorder import record_robot
-
-        traces.append(("rclpy", False, record_robot(python, problems, _SECONDS, directory)))
-    for system, has_kernel, trace in traces:
-        database = directory / f"{system}.duckdb"
-        ingest([trace], database)
-        yield system, has_kernel, database
+    directory.mkdir(parents=True)
 
 
-def missed(problems: Sequence[str], verdict: Sequence[Row], *, has_kernel: bool) -> Iterator[str]:
-    """Yield the problems that a verdict does not name at their place."""
-    # What is wrong with the recording costs nothing.
-    told = [row for row in verdict if row["cost_ns"] is not None]
-    if not problems and (told or "nothing stands out" not in verdict[-1]["sentence"]):
-        yield "that nothing stands out"
-    for place, name in enumerate(problems):
-        if place >= len(told) or not is_named(PROBLEMS[name], told[place], has_kernel=has_kernel):
-            yield name
+def _show(given: Answer) -> None:
+    print(f"{'MISSED' if given.missing else 'named':6}  {given.case.name}, {given.events}")
+    for fault in given.missing:
+        print(f"    {fault}")
+    for row in given.verdict:
+        lines = textwrap.wrap(row.headline, _WIDTH)
+        print(textwrap.indent("\n".join(lines), " " * 8), flush=True)
 
 
-def is_named(problem: Problem, row: Row, *, has_kernel: bool) -> bool:
-    """Whether a sentence says who is to blame for a problem, for what, and a true number."""
-    if problem.without_kernel is not None and not has_kernel:
-        return (
-            row["who"] == problem.without_kernel
-            and re.search(r"for [\d.]+ ms .*not known without a kernel trace", row["sentence"])
-            is not None
-        )
-    said = re.search(problem.sentence, row["sentence"])
-    return (
-        problem.kind in row["kinds"]
-        and re.fullmatch(rf"{problem.culprit}( \(\d+\))?", row["who"]) is not None
-        and said is not None
-        and problem.least <= float(said[1]) <= problem.most
-    )
+def headlines(answers: Sequence[Answer]) -> str:
+    """Return a table of first headlines, in Markdown."""
+    rows: list[tuple[str, ...]] = [
+        ("system", "planted", "recorded", "first headline", "missed", "accused besides"),
+        ("-",) * 6,
+    ]
+    for each in answers:
+        missing, besides = "; ".join(each.missing), ", ".join(each.besides)
+        words = (each.case.system, each.case.planted, each.events, each.headline, missing, besides)
+        rows.append(tuple(word.replace("|", "/") for word in words))
+    return "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
 
 if __name__ == "__main__":

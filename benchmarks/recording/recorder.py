@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import functools
 import json
 import os
 import shutil
+import signal
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -29,18 +32,7 @@ _RESTARTED = {"restarts": "filter"}
 _LATE = {"late"}
 _UNTRACED = {"mixed": {"filter"}}
 _UNTIL_LATE = 2.0
-_ROBOT_NODES = _NODES.parents[1] / "robot" / "real.py"
-_ROBOT = (
-    "lidar",
-    "camera",
-    "filter",
-    "detector",
-    "localization",
-    "map_server",
-    "planner",
-    "control",
-)
-_LATE_ROBOT = 4
+_LAUNCH = _NODES.parents[1] / "robot" / "launch.py"
 
 
 class NotPossibleError(Exception):
@@ -68,6 +60,7 @@ def require_lttng() -> None:
             raise NotPossibleError(f"no {program}")
 
 
+@functools.cache
 def require(python: Path) -> None:
     """Raise a `NotPossibleError` unless LTTng, a compiler and rclpy are there."""
     require_lttng()
@@ -146,56 +139,55 @@ def record(
     return recorded, truth
 
 
-def record_robot(python: Path, problems: Sequence[str], seconds: float, directory: Path) -> Path:
-    """Record the robot with problems from its start, with callbacks and executors of rclpy.
+def record_launched(
+    python: Path, robot: str, problems: Sequence[str], seconds: float, directory: Path
+) -> Path:
+    """Record a robot of `robot/launch.py` with `msgflow record --kernel`, as a user does.
 
     Args:
         python: of the environment with rclpy.
+        robot: its name.
         problems: that are planted.
         seconds: for how long it runs once all its processes do.
         directory: a directory to write to.
 
     Returns:
-        The directory of the trace.
+        The directory of the recording: `ust`, and the events of the kernel beside it.
 
     Raises:
         NotPossibleError: see `require`.
-        subprocess.CalledProcessError: a node failed.
-        RecordingError: LTTng failed.
+        subprocess.SubprocessError: the recording failed, or the robot did not start; `record.log`
+            says why.
     """
     require(python)
     library = build_tracetools(_made(directory / "library"))
-    environment = ros_environment(python)
-    environment |= {"LD_PRELOAD": str(library), "PYTHONPATH": str(PYTHON_NODES)}
+    ready = directory / "ready"
     recorded = directory / "trace"
-    processes = [*_ROBOT, *(["hog"] if "hog" in problems else [])]
-    with session(recorded):
-        running: list[subprocess.Popen[bytes]] = []
+    # Python of msgflow has no use for it.
+    launched = ("env", f"LD_PRELOAD={library}", python, _LAUNCH, robot, ready, seconds, *problems)
+    options = ("--name", directory.name, "-o", recorded, "--kernel", "--no-ingest")
+    command = [str(word) for word in (sys.executable, "-m", "msgflow", "record", *options)]
+    with one_at_a_time(), (directory / "record.log").open("w") as log:
+        recording = subprocess.Popen(
+            [*command, "--", *(str(word) for word in launched)],
+            env=ros_environment(python),
+            cwd=directory,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+        )
         try:
-            for process in sorted(processes, key="planner".__eq__):
-                if process == "planner" and "late" in problems:
-                    for one in running:
-                        _wait_until_ready(one)
-                    time.sleep(_LATE_ROBOT)
-                command = [str(word) for word in (python, _ROBOT_NODES, process, *problems)]
-                running.append(
-                    subprocess.Popen(
-                        command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE
-                    )
-                )
-            is_late = "late" in problems
-            for one in running[-1:] if is_late else running:
-                _wait_until_ready(one)
-            time.sleep(seconds - (_LATE_ROBOT if is_late else 0))
-            for one in reversed(running):
-                assert one.stdin is not None
-                one.stdin.close()
-            for one in running:
-                if one.wait(_LONGEST):
-                    raise subprocess.CalledProcessError(one.returncode, one.args)
+            latest = time.monotonic() + _LONGEST
+            while not ready.exists() and recording.poll() is None and time.monotonic() < latest:
+                time.sleep(_APART)
+            time.sleep(seconds)
+            # As Ctrl-C does: the recording ends, then the robot.
+            recording.send_signal(signal.SIGINT)
+            code = recording.wait(_LONGEST)
         finally:
-            for one in running:
-                one.kill()
+            recording.kill()
+    if not (ready.exists() and (recorded / "ust").is_dir()):
+        raise subprocess.CalledProcessError(code, command)
     return recorded
 
 

@@ -1,28 +1,19 @@
 """One process of the robot of `simulated.py`, with nodes of rclpy.
 
-    python real.py PROCESS [PROBLEM]…
-
-It says `ready` when its nodes spin, and ends when its standard input does. Needs rclpy and no
-package of msgflow: another Python runs it.
+python robot.py PROCESS [PROBLEM]…
 """
 
 from __future__ import annotations
 
 import os
 import random
-import sys
-import threading
 import time
 
 import rclpy
+from parts import PROBLEMS, run
 from rcl_interfaces.srv import ListParameters
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import UInt64
-
-PROBLEMS = sys.argv[2:]
-# Where the hog is, and what it delays.
-CPU = 0
 
 
 def work(milliseconds: float, spread: float = 0) -> None:
@@ -30,7 +21,7 @@ def work(milliseconds: float, spread: float = 0) -> None:
     time.sleep((milliseconds + spread * random.random()) / 1e3)
 
 
-class Part(Node):
+class Relay(Node):
     """A node of the robot."""
 
     def says(self, topic: str):
@@ -45,7 +36,7 @@ class Part(Node):
 
 def sensor(name: str, topic: str, milliseconds: int) -> list[Node]:
     """Publish with a period."""
-    node = Part(name)
+    node = Relay(name)
     send = node.says(topic)
     node.create_timer(milliseconds / 1e3, lambda: (work(1), send()))
     return [node]
@@ -53,7 +44,7 @@ def sensor(name: str, topic: str, milliseconds: int) -> list[Node]:
 
 def relay(name: str, heard: str, said: str, usual: float, spread: float = 1, depth: int = 10):
     """Answer each message of a topic."""
-    node = Part(name)
+    node = Relay(name)
     send = node.says(said)
     node.hears(heard, lambda: (work(usual, spread), send()), depth)
     return [node]
@@ -73,14 +64,17 @@ def detector() -> list[Node]:
 
 def localization() -> list[Node]:
     """Localize, beside a monitor in the same executor: 80 ms each 190 ms, if planted."""
-    monitor = Part("monitor")
+    if "hog" in PROBLEMS:
+        # Where the hog is.
+        os.sched_setaffinity(0, {0})
+    monitor = Relay("monitor")
     monitor.create_timer(0.19, lambda: work(80 if "busy" in PROBLEMS else 1, 4))
     return [*relay("localizer", "/points", "/pose", 4), monitor]
 
 
 def map_server() -> list[Node]:
     """Answer, after 120 ms if planted."""
-    node = Part("map_server")
+    node = Relay("map_server")
 
     def answer(_, response: ListParameters.Response) -> ListParameters.Response:
         work(120 if "service" in PROBLEMS else 1, 3)
@@ -96,7 +90,7 @@ def planner() -> list[Node]:
     No executor of several threads: that of rclpy looks for work again and again until a thread of
     its pool begins with it, and can keep that thread from beginning for some hundred milliseconds.
     """
-    node = Part("planner")
+    node = Relay("planner")
     send = node.says("/plan")
     ask = asking() if "service" in PROBLEMS else lambda: None
     node.hears("/pose", lambda: (work(3), ask(), send()))
@@ -117,34 +111,20 @@ def asking():
 
 def control() -> list[Node]:
     """Answer each plan, or the last one each 600 ms, if planted."""
-    node = Part("controller")
+    node = Relay("controller")
     send = node.says("/cmd")
     if "stale" in PROBLEMS:
         node.hears("/plan", lambda: work(1))
         node.create_timer(0.6, lambda: (work(1), send()))
     else:
         node.hears("/plan", lambda: (work(1), send()))
-    motors = Part("motors")
+    motors = Relay("motors")
     motors.hears("/cmd", lambda: work(1))
     motors.hears("/objects", lambda: None)
     return [node, motors]
 
 
-def hog() -> None:
-    """Take a CPU for 90 ms each 220 ms, before all others."""
-    os.sched_setaffinity(0, {CPU})
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(79))
-    except PermissionError:
-        os.nice(-20)
-    while True:
-        end = time.monotonic() + 0.09
-        while time.monotonic() < end:
-            pass
-        time.sleep(0.13)
-
-
-MAKE = {
+PROCESSES = {
     "lidar": lambda: sensor("lidar", "/scan", 200),
     "camera": lambda: sensor("camera", "/image", 50),
     "filter": filters,
@@ -156,23 +136,5 @@ MAKE = {
 }
 
 
-def main() -> None:
-    """Run a process until the standard input ends."""
-    process = sys.argv[1]
-    # At once: the middleware may never end, if others end at the same time.
-    threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
-    if process == "hog":
-        print("ready", flush=True)
-        hog()
-    if process == "localization" and "hog" in PROBLEMS:
-        os.sched_setaffinity(0, {CPU})
-    rclpy.init()
-    executor = SingleThreadedExecutor()
-    for node in MAKE[process]():
-        executor.add_node(node)
-    print("ready", flush=True)
-    executor.spin()
-
-
 if __name__ == "__main__":
-    main()
+    run(PROCESSES)
