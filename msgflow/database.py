@@ -485,8 +485,9 @@ class Database:
         """Explain why a topic is late: who is to blame, where the time goes, what to ask next.
 
         The first path is that of the worst culprit, or the slowest: all other sections are about
-        it. Each section but the verdict is part of a named query, with the same numbers:
-        e2e-latency, path-breakdown, critical-path, waits --by pair, and topics --measure delivery.
+        it. Each section but the verdict and the doubts, which are findings, is part of a named
+        query, with the same numbers: e2e-latency, path-breakdown, critical-path, waits --by pair,
+        and topics --measure delivery.
 
         Args:
             place: topic or node where the flows end; a glob is possible. By default all ends.
@@ -690,6 +691,7 @@ class Database:
             to=to,
             case=case,
             explain=explain,
+            has_culprits=True,
             at_least=at_least,
             skip_first=skip_first,
             confidence=confidence,

@@ -2,9 +2,11 @@
 -- description: The slowest flows, piece by piece; of one message: msgflow flow --why. Waits are
 --     replaced by what they waited for, as far as the trace shows; where the kernel was traced,
 --     what a thread did by its states (docs/scheduling.md). The pieces add up to the latency.
---     Unless detail is full, those below 1 % are summed up as 'rest'. Flows with a stored message
+--     Unless detail is full, those of one hop that are the same, such as the callbacks of earlier
+--     messages before which a message waits, are one row, at the place of the first. What is below
+--     1 % then is summed up by activity, state and node, or as 'rest'. Flows with a stored message
 --     have no latency, and are left out.
--- grain: one row per flow and piece, node or activity
+-- grain: one row per flow and piece, or pieces that are the same, node or activity
 -- reads: path_chain, path_outcome, named_path
 -- param: from, to, via, without
 -- param: slowest BIGINT {1..} = 1  Number of flows
@@ -18,7 +20,8 @@
 -- param: from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: rank BIGINT              Number of the flow, the slowest first
--- column: at_ns BIGINT [ns]        Start, since the start of the flow; empty for several pieces
+-- column: at_ns BIGINT [ns]        Start, since the start of the flow, of the first of several
+--     pieces; empty where they are summed up
 -- column: duration_ns BIGINT [ns]  Duration; negative if parts of the flow overlap
 -- column: hop
 -- column: part VARCHAR             Part of the flow: 'callback', 'cache', 'request_to_take',
@@ -47,7 +50,7 @@
 -- column: priority INTEGER         Its priority to the kernel; below 100 real-time
 -- column: who_priority INTEGER     Priority of what took the CPU
 -- column: from_ns
--- column: callback_instance_id BIGINT  Identity of the callback instance
+-- column: callback_instance_id BIGINT  Identity of the callback instance, of several the first
 -- column: publication_id
 -- column: take_id BIGINT           Take at the end of the flow
 -- column: latency_ns BIGINT [ns]   Latency of the whole flow
@@ -209,13 +212,27 @@ folded AS (
 sorted AS (
     SELECT
         * REPLACE (greatest(pieces, 1) AS pieces),
+        min(position) OVER equal AS first_position,
+        $detail = 'full' OR abs(sum(duration_ns) OVER equal) >= 0.01 * latency_ns AS is_long
+    FROM folded
+    WINDOW equal AS (
+        PARTITION BY flow_rank, hop, part, activity, state, node, what, who, wakers
+    )
+),
+-- What is too short by itself is not, perhaps, with all that a node did in the same way.
+keyed AS (
+    SELECT
+        *,
         CASE
             WHEN $by = 'node' THEN coalesce(node, '')
             WHEN $by = 'part' THEN concat_ws(' ', activity, state)
-            WHEN $detail = 'short' AND abs(duration_ns) < 0.01 * latency_ns THEN 'rest'
-            ELSE position::VARCHAR
+            WHEN $detail = 'full' THEN position::VARCHAR
+            WHEN is_long THEN first_position::VARCHAR
+            WHEN abs(sum(duration_ns) OVER short) < 0.01 * latency_ns THEN 'rest'
+            ELSE concat_ws(' ', 'short', activity, state, node)
         END AS row_key
-    FROM folded
+    FROM sorted
+    WINDOW short AS (PARTITION BY flow_rank, is_long, activity, state, node)
 ),
 summed AS MATERIALIZED (
     SELECT
@@ -224,18 +241,22 @@ summed AS MATERIALIZED (
         sum(duration_ns)::BIGINT AS duration_ns,
         round(sum(duration_ns) / nullif(latency_ns, 0), 4) AS share,
         sum(pieces)::BIGINT AS pieces,
-        $by = 'piece' AND row_key <> 'rest' AS is_piece,
-        CASE WHEN is_piece THEN any_value(struct_pack(
-            at_ns, hop, part, what, who, thread, wakers, priority, who_priority, is_certain,
-            from_ns, callback_instance_id, publication_id
-        )) END AS piece,
+        $by = 'piece' AND bool_and(is_long) AS is_piece,
+        CASE WHEN is_piece THEN arg_min(
+            struct_pack(
+                at_ns, hop, part, what, who, thread, wakers, priority, who_priority, from_ns,
+                callback_instance_id, publication_id
+            ),
+            position
+        ) END AS piece,
+        CASE WHEN is_piece THEN bool_and(is_certain) END AS is_certain,
         CASE
             WHEN $by = 'piece' AND row_key = 'rest' THEN 'rest'
             WHEN $by <> 'node' THEN any_value(activity)
         END AS activity,
-        CASE WHEN is_piece OR $by = 'node' THEN any_value(node) END AS node,
-        CASE WHEN is_piece OR $by = 'part' THEN any_value(state) END AS state
-    FROM sorted
+        CASE WHEN $by <> 'part' AND row_key <> 'rest' THEN any_value(node) END AS node,
+        CASE WHEN $by <> 'node' AND row_key <> 'rest' THEN any_value(state) END AS state
+    FROM keyed
     GROUP BY run_id, flow_rank, take_id, latency_ns, path_id, row_key
 ),
 ordered AS (
@@ -262,7 +283,7 @@ SELECT
     s.run_id,
     s.flow_rank AS rank,
     s.piece.at_ns, s.duration_ns, s.piece.hop, s.piece.part, s.activity, s.state, s.piece.who,
-    s.node, s.piece.what, s.share, s.pieces, s.piece.is_certain, s.piece.thread, s.piece.wakers,
+    s.node, s.piece.what, s.share, s.pieces, s.is_certain, s.piece.thread, s.piece.wakers,
     s.piece.priority, s.piece.who_priority, s.piece.from_ns, s.piece.callback_instance_id,
     s.piece.publication_id, s.take_id, s.latency_ns,
     -- The path of a flow of a thousand hops is long: only the first of its rows has it.

@@ -28,22 +28,23 @@
 -- Of the whole recording: the window is one of outputs, or of later inputs.
 CREATE OR REPLACE TEMP TABLE every_outcome AS
 FROM main.end_to_end(
-    $runs, $from, $to, $from_event, $to_event, chains := 'path_chain', has_calls := $has_calls,
-    has_gaps := $has_gaps, has_states := $has_states
+    $runs, $from, $to, $from_event, $to_event, chains := 'path_chain',
+    paths := 'named_path', has_calls := $has_calls, has_gaps := $has_gaps,
+    has_states := $has_states
 );
 
 WITH output AS (
     SELECT
-        path_id, sink_event, sink_ns,
+        alike_id, sink_event, sink_ns,
         sink_ns - root_ns AS age_ns,
         is_loss_affected, is_ambiguous,
-        lead(sink_ns) OVER (PARTITION BY path_id ORDER BY sink_ns, take_id) - root_ns AS peak_ns
+        lead(sink_ns) OVER (PARTITION BY alike_id ORDER BY sink_ns, take_id) - root_ns AS peak_ns
     FROM every_outcome
     WHERE status = 'reached' AND is_newest
 ),
 measured AS (
     SELECT
-        path_id,
+        alike_id,
         count(*) AS outputs,
         count(*) FILTER (WHERE is_loss_affected) AS loss_affected,
         count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
@@ -57,7 +58,7 @@ measured AS (
         )::BIGINT AS time_mean_ns
     FROM output
     WHERE sink_ns >= $start_ns AND sink_ns < $end_ns
-    GROUP BY path_id
+    GROUP BY alike_id
 )
 SELECT
     p.run_id,
@@ -67,5 +68,6 @@ SELECT
     m.peaks[2] AS peak_p95_ns,
     m.peak_max_ns, m.time_mean_ns, m.sink_event, p.is_cut, p.path
 FROM named_path AS p
-LEFT JOIN measured AS m ON p.path_id = m.path_id
-ORDER BY p.run_id, p.path, p.path_id
+LEFT JOIN measured AS m ON p.alike_id = m.alike_id
+WHERE p.path_id = p.alike_id
+ORDER BY p.run_id, p.path

@@ -28,31 +28,31 @@
 CREATE OR REPLACE TEMP TABLE answered_input AS
 WITH input AS (
     SELECT
-        path_id, root_kind, root_id,
+        alike_id, root_kind, root_id,
         any_value(root_ns) AS root_ns,
         min(sink_ns) AS first_ns,
         any_value(sink_event) AS sink_event,
         bool_or(is_loss_affected) AS is_loss_affected,
         arg_min(is_ambiguous, sink_ns) AS is_ambiguous
     FROM every_outcome
-    GROUP BY path_id, root_kind, root_id
+    GROUP BY alike_id, root_kind, root_id
 )
 SELECT
-    path_id, root_ns, sink_event, is_loss_affected,
+    alike_id, root_ns, sink_event, is_loss_affected,
     lag(root_ns) OVER in_time AS previous_ns,
     min(first_ns) OVER from_here AS answer_ns,
     arg_min(is_ambiguous, first_ns) OVER from_here AS is_ambiguous
 FROM input
 WINDOW
-    in_time AS (PARTITION BY path_id ORDER BY root_ns, root_kind, root_id),
+    in_time AS (PARTITION BY alike_id ORDER BY root_ns, root_kind, root_id),
     from_here AS (
-        PARTITION BY path_id ORDER BY root_ns DESC, root_kind DESC, root_id DESC
+        PARTITION BY alike_id ORDER BY root_ns DESC, root_kind DESC, root_id DESC
         ROWS UNBOUNDED PRECEDING
     );
 
 WITH windowed AS (
     SELECT
-        path_id, sink_event, is_loss_affected, is_ambiguous, answer_ns,
+        alike_id, sink_event, is_loss_affected, is_ambiguous, answer_ns,
         root_ns - previous_ns AS interval_ns,
         answer_ns - previous_ns AS reaction_ns,
         answer_ns - root_ns AS delay_ns
@@ -61,7 +61,7 @@ WITH windowed AS (
 ),
 measured AS (
     SELECT
-        path_id,
+        alike_id,
         count(*) AS inputs,
         count(reaction_ns) AS intervals,
         count(*) FILTER (WHERE answer_ns IS NULL) AS unanswered,
@@ -74,7 +74,7 @@ measured AS (
             / nullif(sum(CASE WHEN reaction_ns IS NOT NULL THEN interval_ns END), 0)
         )::BIGINT AS event_mean_ns
     FROM windowed
-    GROUP BY path_id
+    GROUP BY alike_id
 )
 SELECT
     p.run_id,
@@ -82,5 +82,6 @@ SELECT
     unnest(m.reaction),
     m.event_mean_ns, m.sink_event, p.is_cut, p.path
 FROM named_path AS p
-LEFT JOIN measured AS m ON p.path_id = m.path_id
-ORDER BY p.run_id, p.path, p.path_id
+LEFT JOIN measured AS m ON p.alike_id = m.alike_id
+WHERE p.path_id = p.alike_id
+ORDER BY p.run_id, p.path

@@ -24,19 +24,19 @@
 -- note: clocks
 WITH cycle AS (
     SELECT
-        path_id, answer_ns,
+        alike_id, answer_ns,
         min(root_ns) AS oldest_ns,
         max(root_ns) AS newest_ns,
         any_value(sink_event) AS sink_event,
         bool_or(is_ambiguous) AS is_ambiguous
     FROM answered_input
     WHERE answer_ns IS NOT NULL
-    GROUP BY path_id, answer_ns
-    QUALIFY row_number() OVER (PARTITION BY path_id ORDER BY answer_ns) > 1
+    GROUP BY alike_id, answer_ns
+    QUALIFY row_number() OVER (PARTITION BY alike_id ORDER BY answer_ns) > 1
 ),
 response AS (
     SELECT
-        path_id, sink_event, is_ambiguous,
+        alike_id, sink_event, is_ambiguous,
         newest_ns AS input_ns,
         unnest([
             {response: 'best', response_ns: answer_ns - newest_ns},
@@ -44,33 +44,33 @@ response AS (
             {
                 response: 'worst-with-external-latency',
                 response_ns: answer_ns - lag(newest_ns) OVER (
-                    PARTITION BY path_id ORDER BY answer_ns
+                    PARTITION BY alike_id ORDER BY answer_ns
                 )
             }
         ], recursive := true)
     FROM cycle
     UNION ALL
     SELECT
-        a.path_id, a.sink_event, a.is_ambiguous, a.root_ns, 'all',
+        a.alike_id, a.sink_event, a.is_ambiguous, a.root_ns, 'all',
         a.answer_ns - a.root_ns
     FROM answered_input AS a
-    JOIN cycle AS c ON a.path_id = c.path_id AND a.answer_ns = c.answer_ns
+    JOIN cycle AS c ON a.alike_id = c.alike_id AND a.answer_ns = c.answer_ns
 ),
 measured AS (
     SELECT
-        path_id, response,
+        alike_id, response,
         count(response_ns) AS count,
         count(response_ns) FILTER (WHERE is_ambiguous) AS ambiguous,
         any_value(sink_event) AS sink_event,
         main.spread(response_ns) AS spread
     FROM response
     WHERE input_ns >= $start_ns AND input_ns < $end_ns
-    GROUP BY path_id, response
+    GROUP BY alike_id, response
 )
 SELECT
     p.run_id, m.response, m.count, m.ambiguous,
     unnest(m.spread),
     m.sink_event, p.is_cut, p.path
 FROM named_path AS p
-JOIN measured AS m ON p.path_id = m.path_id
-ORDER BY p.run_id, p.path, p.path_id, m.response
+JOIN measured AS m ON p.path_id = m.alike_id
+ORDER BY p.run_id, p.path, m.response

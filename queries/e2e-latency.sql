@@ -4,7 +4,8 @@
 --     every path of the computation graph. Every root is counted once: reached the end,
 --     superseded by a newer input, dropped (a queue was full), lost on the way, no output (a node
 --     did not publish), not connected, cut by the recording (too close to its start or end to
---     know), or unknown.
+--     know), or unknown. Several subscriptions or publishers of a node, and its lives, one after
+--     the other, are one path.
 -- grain: one row per path
 -- variant: measure VARCHAR {latency|age|reaction|response} = 'latency'  From start to end of flows,
 --     age of the data behind an output, time until an event shows, or response times of CARET
@@ -48,15 +49,19 @@
 CREATE OR REPLACE TEMP TABLE path_chain AS
 FROM main.flow_chain($runs, $from, $to, max_depth := $max_depth, max_paths := $max_paths);
 
+CREATE OR REPLACE TEMP TABLE named_path AS
+SELECT
+    run_id, path_id, alike_id, subscription_id, is_path,
+    bool_or(is_cut) OVER (PARTITION BY alike_id) AS is_cut,
+    path, topics, publishers, subscriptions
+FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
+
 CREATE OR REPLACE TEMP TABLE path_outcome AS
 FROM main.end_to_end(
     $runs, $from, $to, $from_event, $to_event, $start_ns, $end_ns, chains := 'path_chain',
-    has_calls := $has_calls, has_gaps := $has_gaps, has_states := $has_states
+    paths := 'named_path', has_calls := $has_calls, has_gaps := $has_gaps,
+    has_states := $has_states
 );
-
-CREATE OR REPLACE TEMP TABLE named_path AS
-SELECT run_id, path_id, subscription_id, is_path, is_cut, path, topics, publishers, subscriptions
-FROM main.flow_path($runs, only_paths := true, chains := 'path_chain');
 
 -- Only where the end of a path goes on can anything come back to it.
 -- when: named_path WHERE subscription_id IN (FROM main.continued_subscription($runs))
@@ -96,17 +101,17 @@ WITH flow AS (
 -- What became of a root is the same in each of its rows, but for gaps in its time.
 completeness AS (
     SELECT
-        path_id,
+        alike_id,
         count(*) FILTER (is_first IS NOT false) AS roots,
         histogram(status) FILTER (is_first IS NOT false)::MAP(VARCHAR, BIGINT) AS number,
         main.word_counts(CASE WHEN status <> 'reached' THEN reason END) AS reasons,
         count(DISTINCT (root_kind, root_id)) FILTER (is_loss_affected) AS loss_affected
     FROM flow
-    GROUP BY path_id
+    GROUP BY alike_id
 ),
 latency AS (
     SELECT
-        run_id, path_id,
+        alike_id,
         count(*) FILTER (WHERE is_ambiguous) AS ambiguous,
         count(latency_ns) AS pairs,
         count(*) - count(latency_ns) AS stored,
@@ -117,7 +122,15 @@ latency AS (
             FILTER (WHERE latency_ns IS NOT NULL) AS longest
     FROM flow
     WHERE status = 'reached' AND is_counted
-    GROUP BY run_id, path_id
+    GROUP BY alike_id
+),
+looped AS (
+    SELECT
+        p.alike_id,
+        sum(o.number)::BIGINT AS number
+    FROM looped_path AS o
+    JOIN named_path AS p ON o.path_id = p.path_id
+    GROUP BY p.alike_id
 )
 SELECT
     p.run_id,
@@ -137,7 +150,8 @@ SELECT
     -l.longest.before_take AS max_take_id,
     l.sink_event, p.is_cut, c.reasons, p.path
 FROM named_path AS p
-LEFT JOIN completeness AS c ON p.path_id = c.path_id
-LEFT JOIN latency AS l ON p.path_id = l.path_id
-LEFT JOIN looped_path AS o ON p.path_id = o.path_id
-ORDER BY p.run_id, p.path, p.path_id
+LEFT JOIN completeness AS c ON p.alike_id = c.alike_id
+LEFT JOIN latency AS l ON p.alike_id = l.alike_id
+LEFT JOIN looped AS o ON p.alike_id = o.alike_id
+WHERE p.path_id = p.alike_id
+ORDER BY p.run_id, p.path

@@ -13,7 +13,8 @@
 -- reads: path_chain, path_outcome, named_path
 -- param: from, to, from_event, to_event, case, max_depth, max_paths
 -- column: run_id
--- column: path_id BIGINT           Number of the path
+-- column: path_id BIGINT           Number of the path; of several with the same nodes and topics
+--     the first
 -- column: hop
 -- column: part VARCHAR             'callback', 'cache', 'service', a layer of publishing
 --     ('intra', 'rclcpp', 'rcl', 'rmw', 'dds', or 'publish' where it is not known),
@@ -68,11 +69,20 @@ SELECT h.flow_id, h.hop, a.run_queue_ns, a.executor_ns
 FROM breakdown_trail AS h
 JOIN exact_arrival AS a ON h.take_id = a.take_id;
 
--- Between clocks that are apart the time that they show may be shorter than the executor was busy.
-WITH piece AS (
+-- A node that began again, or has several callbacks of one label, has one row.
+WITH labelled AS (
     SELECT
-        p.path_id, p.flow_id, p.hop, p.rank, p.part, p.duration_ns, p.is_turning,
-        k.alike_id AS callback_id,
+        callback_id,
+        min(callback_id) OVER (PARTITION BY run_id, node, label) AS first_id
+    FROM main.callback_label
+    WHERE list_contains($runs, run_id)
+),
+-- Between clocks that are apart the time that they show may be shorter than the executor was busy.
+piece AS (
+    SELECT
+        d.alike_id AS path_id,
+        p.flow_id, p.hop, p.rank, p.part, p.duration_ns, p.is_turning,
+        k.first_id AS callback_id,
         least(coalesce(p.busy_min_ns, 0), greatest(p.duration_ns, 0)) AS busy_min_ns,
         least(coalesce(p.busy_max_ns, p.duration_ns), greatest(p.duration_ns, 0)) AS busy_max_ns,
         a.run_queue_ns, a.executor_ns,
@@ -92,7 +102,8 @@ WITH piece AS (
     ) AS p
     LEFT JOIN breakdown_arrival AS a
         ON p.flow_id = a.flow_id AND p.hop = a.hop AND p.part = 'publish_to_take'
-    LEFT JOIN main.callback_alike AS k ON p.callback_id = k.callback_id
+    JOIN named_path AS d ON p.path_id = d.path_id
+    LEFT JOIN labelled AS k ON p.callback_id = k.callback_id
 ),
 part AS (
     SELECT
@@ -145,10 +156,11 @@ message AS (
 ),
 doubted AS (
     SELECT
-        path_id,
-        count(*) FILTER (WHERE is_ambiguous) AS flows
-    FROM breakdown_flow
-    GROUP BY path_id
+        p.alike_id AS path_id,
+        count(*) FILTER (WHERE f.is_ambiguous) AS flows
+    FROM breakdown_flow AS f
+    JOIN named_path AS p ON f.path_id = p.path_id
+    GROUP BY p.alike_id
 )
 SELECT
     p.run_id, m.path_id, m.hop, m.part,

@@ -27,7 +27,8 @@
 --     waits, overlap_max_ns, overlap_min_ns, instances
 CREATE OR REPLACE TEMP TABLE explained_wait AS
 SELECT
-    run_id, callback_instance_id, executor_id, callback_id, start_ns, busy_min_ns, busy_max_ns,
+    run_id, callback_instance_id, executor_id, callback_id, earliest_ns, latest_ns, start_ns,
+    busy_min_ns, busy_max_ns,
     held_max_ns, run_queue_ns, preempted_ns, meanwhile_callback_ids, meanwhile_ns,
     meanwhile_certain_ns, meanwhile_thread_ns, meanwhile_instances, cpu_taken_by, cpu_taken_ns
 FROM main.executor_wait_explained(

@@ -178,8 +178,8 @@ CREATE TABLE store.callback (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     process_id BIGINT NOT NULL,  -- Process it lives in {to process}
     node_id BIGINT,  -- Node it belongs to {to node}
-    kind VARCHAR NOT NULL,  -- 'subscription', 'timer', 'service', 'function' (of Python: a task, of
-        -- an action or client) or 'unknown'
+    kind VARCHAR NOT NULL,  -- 'subscription', 'timer', 'service', 'action' (of Python: it executes
+        -- goals), 'function' (of Python: a task, or of a client) or 'unknown'
     subscription_id BIGINT,  -- Its subscription {to subscription}
     timer_id BIGINT,  -- Its timer {to timer}
     service_id BIGINT,  -- Its service {to service}

@@ -69,6 +69,7 @@
 --     excludes the waiting one) or 'undecided' (nothing shows when the message arrived); in a cache
 --     'timer' (not due yet), 'unpublished' (the message that was waited for), or a part of that
 --     message's own flow
+-- column: alike_id BIGINT  The first path of the run with the same nodes and topics
 -- column: ambiguous BIGINT  Links with more than one candidate
 -- column: at_ns BIGINT [epoch ns]  Start of the publication, or the take
 -- column: b_count BIGINT  Values of run B

@@ -9,10 +9,13 @@ import typer
 
 from msgflow.cli.operation import asks
 from msgflow.cli.options import OUTPUT
-from msgflow.cli.output import Shown, print_error, print_result
+from msgflow.cli.output import Shown, print_error, print_lines, print_note, print_result
 from msgflow.database import Database
 from msgflow.errors import ExitCode
 from msgflow.export.formats import Format
+from msgflow.result.layout import screen_width
+from msgflow.text.values import printable
+from msgflow.text.wrapping import wrap
 
 if TYPE_CHECKING:
     from msgflow.query.compare import Comparison
@@ -20,6 +23,8 @@ if TYPE_CHECKING:
 
 # Rows on a terminal, where long paths take several lines.
 _MOST_ROWS = 10
+# The greatest change, and culprits.
+_MOST_LINES = 4
 
 
 def _read(conditions: list[str] | None) -> list[str]:
@@ -39,6 +44,10 @@ FailOn = Annotated[
         " p95, p99 or max), or if less arrives: 'share<-1%'; may be repeated",
     ),
 ]
+EvenByChance = Annotated[
+    bool,
+    typer.Option("--even-by-chance", help="--fail-on counts differences that may be chance, too"),
+]
 OnlyDifferent = Annotated[
     bool | None,
     typer.Option(
@@ -55,16 +64,18 @@ def command(
     comparison: Comparison,
     *,
     fail_on: FailOn = None,
+    even_by_chance: EvenByChance = False,
     only_different: OnlyDifferent = None,
     **shown: Unpack[Shown],
 ) -> None:
     """`msgflow compare RUN_A RUN_B --fail-on 'p95>5%'` is a check for CI."""
-    print_comparison(comparison, fail_on or (), only_different, **shown)
+    print_comparison(comparison, fail_on or (), even_by_chance, only_different, **shown)
 
 
 def print_comparison(
     comparison: Differences,
     fail_on: Sequence[str],
+    even_by_chance: bool,
     only_different: bool | None,
     **shown: Unpack[Shown],
 ) -> None:
@@ -75,9 +86,28 @@ def print_comparison(
         result = comparison.parts
     elif only_different is not None or (is_table and not shown.get("wide")):
         result = comparison.changes(only_different=only_different is True)
+    if is_table:
+        _print_begin(comparison.lines, None if shown.get("wide") else _MOST_LINES)
     print_result(result, **shown, most_rows=_MOST_ROWS)
-    failures = comparison.failures(fail_on)
+    if not is_table:
+        for line in comparison.lines:
+            print_note(line)
+    exceeding = comparison.failures(fail_on, even_by_chance=True)
+    failures = [each for each in exceeding if even_by_chance or not each.may_be_chance]
+    if number := len(exceeding) - len(failures):
+        differences = "1 difference" if number == 1 else f"{number} differences"
+        print_note(f"{differences} beyond a limit may be chance: --even-by-chance counts them")
     for failure in failures:
         print_error(f"{failure.condition}: {failure.reason} — {failure.subject}")
     if failures:
         raise typer.Exit(ExitCode.FAILED)
+
+
+def _print_begin(lines: Sequence[str], most: int | None) -> None:
+    shown = list(lines[:most])
+    if more := len(lines) - len(shown):
+        shown.append(f"{more} more (--wide)")
+    width = screen_width()
+    print_lines(text for line in shown for text in wrap(printable(line), width))
+    if lines:
+        print_lines([""])

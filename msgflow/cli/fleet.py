@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
 
 import typer
 
-from msgflow.cli.compare import FailOn, OnlyDifferent, print_comparison
+from msgflow.cli.compare import EvenByChance, FailOn, OnlyDifferent, print_comparison
 from msgflow.cli.operation import operation
 from msgflow.cli.options import Reader, bytes_of, one_text
 from msgflow.cli.output import Shown, print_list, print_note, print_result, print_status
@@ -321,6 +321,7 @@ def compare(
     confidence: float = 0.95,
     at_least: str = "5%",
     fail_on: FailOn = None,
+    even_by_chance: EvenByChance = False,
     only_different: OnlyDifferent = None,
     **shown: Unpack[Shown],
 ) -> None:
@@ -354,7 +355,7 @@ def compare(
         confidence=confidence,
         at_least=at_least,
     )
-    print_comparison(comparison, fail_on or [], only_different, **shown)
+    print_comparison(comparison, fail_on or [], even_by_chance, only_different, **shown)
 
 
 def _labels(texts: list[str]) -> dict[str, str]:

@@ -1,18 +1,25 @@
-"""Record a ROS 2 system with LTTng, then print what is wrong and how long messages took."""
+"""Record a ROS 2 system with LTTng, then print what is wrong, what is slow, and how slow."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from msgflow.cli.operation import operation
-from msgflow.cli.output import print_note, print_result, print_status
-from msgflow.errors import ExitCode
+from msgflow.cli.output import (
+    command_text,
+    print_lines,
+    print_note,
+    print_result,
+    print_status,
+)
+from msgflow.errors import ExitCode, NoFlowError
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.run.choice import require_run_name
 
@@ -66,6 +73,7 @@ def command(
     """
     from msgflow.cli import check
     from msgflow.cli import ingest as ingest_command
+    from msgflow.cli.culprits import culprit_lines
     from msgflow.cli.tracing_cost import part_of_latencies
     from msgflow.clocks.clocks_file import read_clock_sync
     from msgflow.database import Database
@@ -74,6 +82,7 @@ def command(
     from msgflow.record.program import PYTHON_NODES
     from msgflow.record.recording import record
     from msgflow.record.session import EVENTS, Channel
+    from msgflow.result.layout import screen_width
 
     if print_python_path:
         typer.echo(PYTHON_NODES)
@@ -126,12 +135,21 @@ def command(
         except typer.Exit:  # of errors in the recording, which it has printed
             has_failed = True
         with Database(database) as opened:
-            latencies = opened.query("e2e-latency")
+            # Where no flow arrives there are no paths: that is said below.
+            with suppress(NoFlowError):
+                verdict = opened.why(run=name).verdict
+                command_of = partial(_command, database)
+                print_lines(culprit_lines(verdict, command_of, screen_width()))
+            latencies = opened.query("e2e-latency", run=name)
             print_result(latencies)
             for sentence in part_of_latencies(opened, latencies):
                 print_status(sentence)
     if has_failed:
         raise typer.Exit(ExitCode.FAILED)
+
+
+def _command(database: Path, words: Sequence[str]) -> str:
+    return command_text(["msgflow", *words], database)
 
 
 def _require_database(database: Path, name: str) -> None:

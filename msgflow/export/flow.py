@@ -394,13 +394,13 @@ def _busy(node: Row) -> list[str]:
     """Return how long its executor was busy with other callbacks before the take."""
     least_ns, most_ns = node["busy_min_ns"], node["busy_max_ns"]
     if most_ns is None:
-        return [f"executor busy at least {format_duration(least_ns)}"] if least_ns else []
+        return [f"in the queue at least {format_duration(least_ns)}"] if least_ns else []
     if most_ns == 0:
         return []
     if least_ns == most_ns:
-        return [f"executor busy {format_duration(most_ns)}"]
+        return [f"in the queue {format_duration(most_ns)}"]
     least = f"{format_duration(least_ns)} to" if least_ns else "up to"
-    return [f"executor busy {least} {format_duration(most_ns)}"]
+    return [f"in the queue {least} {format_duration(most_ns)}"]
 
 
 def _call(call: Row) -> str:

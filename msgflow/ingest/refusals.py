@@ -33,8 +33,9 @@ def require_ros_traces(traces: Sequence[TraceInfo]) -> None:
         declared = sorted({name for trace in traces for name in trace.event_names})
         raise TraceError(
             f"no ROS 2 events, the trace declares {_listed(declared)} — {_paths(traces)}",
-            "record with `ros2 trace`; if that was done, tracetools was built without LTTng "
-            "(binary packages before Iron are): rebuild it from source with lttng-ust installed",
+            "record with `ros2 trace` until the nodes have started; if that was done, tracetools "
+            "was built without LTTng (binary packages before Iron are): rebuild it from source "
+            "with lttng-ust installed",
         )
     for trace in ros:
         if not trace.has_process_context:
@@ -65,8 +66,9 @@ def require_ros_events(
         )
     raise TraceError(
         f"no ROS 2 event was recorded, the trace holds {found} — {_paths(traces)}",
-        "start tracing before the ROS 2 system, and record as the user who runs it; if that was "
-        "done, tracetools was built without LTTng (binary packages before Iron are)",
+        "start tracing before the ROS 2 system, until its nodes have started, and record as the "
+        "user who runs it; if that was done, tracetools was built without LTTng (binary packages "
+        "before Iron are)",
     )
 
 

@@ -235,10 +235,11 @@ class _Tools:
         start: str | None = None,
         end: str | None = None,
     ) -> str:
-        """Explain why a topic is late: what stands out, the paths, and where their time goes.
+        """Explain why a topic is late: the culprits, the paths, and where their time goes.
 
-        place: topic or node where the flows end; by default all ends. run, start,
-        end: as for run_query.
+        Section verdict has the culprits, the worst first: headline, evidence, and in next what to
+        ask then, as words of the command line. place: topic or node where the flows end; by
+        default all ends. run, start, end: as for run_query.
         """
         found = self._database.why(place, run=run, start=start, end=end)
         rows = (

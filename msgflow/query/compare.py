@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 import duckdb
 
-from msgflow.errors import UsageError
+from msgflow.errors import NoFlowError, UsageError
 from msgflow.files.resources import resource_directory
 from msgflow.query.catalogue import load_query
-from msgflow.query.differences import STATISTICS, Differences
+from msgflow.query.differences import STATISTICS, Differences, warm_up_seconds
 from msgflow.query.names import require_places
 from msgflow.query.notes import AMBIGUOUS, clock_notes, doubt_notes, function_notes, schedule_notes
 from msgflow.query.runner import bind, run_query
 from msgflow.query.selection import CUT_COLUMN
+from msgflow.query.why import explain as explain_run
 from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import Run, choose_one, choose_runs, read_runs
 from msgflow.run.slice import Slice
@@ -39,8 +40,6 @@ _CUT = (
     " choose"
 )
 _OF_PARTS = ("from", "to", "case", "max_depth", "max_paths")
-# Warm-up is left out in steps of half a second.
-_STEP_NS = 500_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,9 +73,13 @@ def compare(
     window: Sequence[str] = (),
     at_least: str = "5%",
     explain: bool = False,
+    has_culprits: bool = False,
     **given: Value,
 ) -> Comparison:
-    """Compare two runs of a database, or two times of one; see `Database.compare`."""
+    """Compare two runs of a database, or two times of one; see `Database.compare`.
+
+    `has_culprits` asks who is to blame for the changes of paths.
+    """
     if (run_a is None) is not (run_b is None) or (run_a is None and not window):
         raise UsageError(
             "a comparison is of two runs, or of two times of one",
@@ -110,9 +113,47 @@ def compare(
         compared.result.notes.append(f"{side} is {text} of run {one.title}")
     if not window:
         compared.result.notes.extend(_slow_starts(compared))
+    if asked["what"] != "paths":
+        return compared
+    windows = window or ("..", "..")
+    if has_culprits:
+        compared = _with_culprits(connection, compared, asked, windows)
     if not explain:
         return compared
-    return replace(compared, parts=_parts(connection, compared, asked, window or ("..", "..")))
+    return replace(compared, parts=_parts(connection, compared, asked, windows))
+
+
+def _slices(compared: Comparison, windows: Sequence[str]) -> Iterator[tuple[str, Run, Slice]]:
+    """Yield which side it is, the run of each, and its times; `windows` are 'START..END'."""
+    skipped = str(compared.skipped) if compared.skipped else None
+    for side, run, window in zip("ab", compared.result.runs, windows, strict=True):
+        start, _, end = window.partition("..")
+        yield side, run, Slice(run.run_id, start or skipped, end or None)
+
+
+def _with_culprits(
+    connection: duckdb.DuckDBPyConnection,
+    compared: Comparison,
+    asked: Mapping[str, Any],
+    windows: Sequence[str],
+) -> Comparison:
+    """Return a comparison with what is to blame in one run, and not as much in the other."""
+    found = {}
+    for side, run, part in _slices(compared, windows):
+        try:
+            found[side] = explain_run(connection, run, part, asked["to"])
+        except NoFlowError:
+            return compared
+    tables = {"compared": compared.result.table}
+    for side, each in found.items():
+        tables |= {f"culprit_{side}": each.verdict.table, f"wait_{side}": each.waits.table}
+    with registered(connection, **tables):
+        table = internal_sql().run(connection, "changed_culprit", asked).to_arrow_table()
+        with registered(connection, changed_culprit=table):
+            lines = internal_sql().run(connection, "change_sentence", {}).fetchall()
+    header = replace(internal_sql().header("changed_culprit"), name="compare")
+    culprits = QueryResult(table, header, compared.result.runs)
+    return replace(compared, culprits=culprits, lines=tuple(line for (line,) in lines))
 
 
 def _parts(
@@ -126,11 +167,8 @@ def _parts(
     `asked` are the parameters of the comparison, and `windows` 'START..END' of either side.
     """
     parameters = {name: asked[name] for name in _OF_PARTS}
-    skipped = str(compared.skipped) if compared.skipped else None
     tables = {"compared": compared.result.table}
-    for side, run, window in zip("ab", compared.result.runs, windows, strict=True):
-        start, _, end = window.partition("..")
-        part = Slice(run.run_id, start or skipped, end or None)
+    for side, run, part in _slices(compared, windows):
         found = run_query(connection, load_query("path-breakdown"), parameters, part)
         tables[f"part_{side}"] = found.table
         values = {"run_id": run.run_id, **part.window([run]).bindings}
@@ -305,11 +343,6 @@ def _warm_up(compared: Comparison) -> float:
     table = compared.result.table
     ends = [*table.column("a_warm_up_ns").to_pylist(), *table.column("b_warm_up_ns").to_pylist()]
     return warm_up_seconds(max((end for end in ends if end is not None), default=None))
-
-
-def warm_up_seconds(last_ns: int | None) -> float:
-    """Return what leaves out a warm-up whose last long value lies so long after the start."""
-    return 0.0 if last_ns is None else (last_ns // _STEP_NS + 1) * _STEP_NS / 1e9
 
 
 def _slow_starts(compared: Comparison) -> Iterable[str]:

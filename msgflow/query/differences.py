@@ -24,6 +24,8 @@ _CONDITION = re.compile(
     rf"\s*(?:(?P<statistic>{'|'.join(STATISTICS)})\s*>\s*(?P<limit>\d+(?:\.\d+)?)"
     rf"\s*(?P<unit>%|ns|us|µs|ms|s)|{SHARE}\s*<\s*-\s*(?P<points>\d+(?:\.\d+)?)\s*%)\s*"
 )
+# Warm-up is left out in steps of half a second.
+_STEP_NS = 500_000_000
 _UNIT_NS = {"ns": 1, "us": 1_000, "µs": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
 _NONE = "none shown"
 _CHANGED = ("longer", "shorter", "both", "only in A", "only in B")
@@ -47,11 +49,13 @@ class Failure:
         condition: as the user wrote it.
         subject: the path, callback or topic.
         reason: the measured difference.
+        may_be_chance: the values are too few, or too alike in both, to exclude chance.
     """
 
     condition: str
     subject: str
     reason: str
+    may_be_chance: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,11 +67,16 @@ class Differences:
             runs `internal.fleet_comparison`.
         parts: what the differences of the means of paths consist of, see `internal.change_part`;
             None unless asked for.
+        culprits: what `why` blames in one run, and not as much in the other, see
+            `internal.changed_culprit`; None where paths of two runs are not compared.
+        lines: the greatest change, and where it comes from; then the culprits that changed.
         all_paths: how to compare all paths, where some are left out.
     """
 
     result: QueryResult
     parts: QueryResult | None = None
+    culprits: QueryResult | None = None
+    lines: tuple[str, ...] = ()
     all_paths: str = "a higher --max-paths or --max-depth, or --from and --to"
 
     def changes(self, *, only_different: bool = True) -> QueryResult:
@@ -96,12 +105,14 @@ class Differences:
         between = f" between {names}" if names else ""
         return replace(found, when_empty=f"no difference is shown{between}: {text}")
 
-    def failures(self, conditions: Iterable[str]) -> list[Failure]:
+    def failures(self, conditions: Iterable[str], *, even_by_chance: bool = False) -> list[Failure]:
         """Return what exceeds A by more than conditions such as 'p95>5%' or 'median>2ms' allow.
 
         'share<-1%' limits how much less may arrive: the share in B may be that many points below
-        the share in A. A subject with values in A and none in B fails, too. The measured values
-        decide, even if the difference may be chance.
+        the share in A. A subject with values in A and none in B fails, too.
+
+        Args:
+            even_by_chance: differences count that may be chance, too.
         """
         wanted = parse_conditions(conditions)
         if not wanted:
@@ -115,13 +126,22 @@ class Differences:
         tables = {"compared": self.result.table, "condition": pa.Table.from_pylist(places)}
         with duckdb.connect() as con, registered(con, **tables):
             rows = internal_sql().run(con, "excess", {}).fetchall()
-        for condition, subject, reason, a_text in rows:
+        for condition, subject, reason, a_text, _ in rows:
             if reason is None:
                 raise UsageError(
                     f"no percentage can be told of {a_text} in A: {condition} — {subject}",
                     "msgflow clocks apply messages, or a limit in ns, us, ms or s",
                 )
-        return [Failure(*row[:3]) for row in rows]
+        return [
+            Failure(condition, subject, reason, may_be_chance)
+            for condition, subject, reason, _, may_be_chance in rows
+            if even_by_chance or not may_be_chance
+        ]
+
+
+def warm_up_seconds(last_ns: int | None) -> float:
+    """Return what leaves out a warm-up whose last long value lies so long after the start."""
+    return 0.0 if last_ns is None else (last_ns // _STEP_NS + 1) * _STEP_NS / 1e9
 
 
 def parse_conditions(texts: Iterable[str]) -> list[Condition]:

@@ -66,6 +66,10 @@ class Steps:
             with contextlib.suppress(duckdb.Error):
                 self._connection.execute(f"DROP TABLE IF EXISTS temp.{table}")
 
+    def __contains__(self, table: str) -> bool:
+        """Whether a table was made."""
+        return table in self._made
+
     @cached_property
     def recorded(self) -> Mapping[str, bool]:
         """What the recordings of the database have, by the names in `RECORDED`."""
@@ -103,6 +107,11 @@ class Steps:
         """Make a table of the rows of a statement of `schema/internal`, which has its name."""
         self._made[name] = "", {}
         internal_sql().keep(self._connection, name, values)
+
+    def unite(self, table: str, statements: Statements, values: Mapping[str, Any]) -> None:
+        """Make a table of the rows of all statements of a folder."""
+        self._made[table] = "", {}
+        statements.unite(self._connection, table, values)
 
 
 def run_query(

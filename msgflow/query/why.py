@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import fnmatch
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from msgflow.errors import NoFlowError
 from msgflow.files.resources import resource_directory
 from msgflow.query.catalogue import load_query
-from msgflow.query.compare import warm_up_seconds
+from msgflow.query.differences import warm_up_seconds
 from msgflow.query.names import with_path_numbers
 from msgflow.query.runner import Steps, run_query
 from msgflow.sql.statement import (
     Statements,
+    culprit_sql,
     health_sql,
     internal_sql,
     may_have_rows,
@@ -53,15 +53,17 @@ class Explanation:
         run: what was read.
         start: begin of what was read, as of `msgflow.Slice`; as a rule a warm-up is left out.
         place: the topic or node at which flows end; None: wherever they end.
-        verdict: a sentence for each culprit, the worst first; before them what is wrong with the
-            recording, or the system. `who` and `kinds` say who does what.
+        verdict: a row for each culprit, the worst first: who, what kind, how much harm, the
+            headline and what shows it; or one row which says that nothing stands out.
+        doubts: what the recording cannot tell, or what is wrong with the system, as far as it
+            touches these paths: rows of findings.
         paths: rows of `e2e-latency`, first the path of the worst culprit.
         nodes: share of the time of that path by node, and what most of it was; the largest first.
         slow_flow: rows of `critical-path`: the longest pieces of a slow flow of it, in order, and
             the sum of the others. Of 100 flows, 95 take no longer.
         waits: rows of `waits --by pair`: what kept the callbacks of the path waiting longest.
         losses: rows of `topics --measure delivery` on its topics with messages dropped or lost.
-        steps: commands that show more, as words behind `msgflow`.
+        steps: commands that show more of the path, as words behind `msgflow`.
         notes: a sentence each.
     """
 
@@ -69,6 +71,7 @@ class Explanation:
     start: str | int | None
     place: str | None
     verdict: QueryResult
+    doubts: QueryResult
     paths: QueryResult
     nodes: QueryResult
     slow_flow: QueryResult
@@ -80,7 +83,7 @@ class Explanation:
     @property
     def sections(self) -> dict[str, QueryResult]:
         """The results, by the names of the attributes."""
-        names = ("verdict", "paths", "nodes", "slow_flow", "waits", "losses")
+        names = ("verdict", "doubts", "paths", "nodes", "slow_flow", "waits", "losses")
         return {name: getattr(self, name) for name in names}
 
 
@@ -110,31 +113,35 @@ class _Questions:
             "runs": [self.run.run_id],
             **times.window([self.run]).bindings,
             "asked_ns": asked.window([self.run]).start_ns,
+            "place": self.place,
             **self.steps.recorded,
         }
-        self.steps.keep("ready_wait", values)
+        self.keep(["ready_wait"], values)
         waits = self.ask("waits-pair", times)
         parts = self.ask("path-breakdown", times, to=self.place)
         # What is lost while a system warms up is lost.
         losses = self.ask("topics-delivery", asked)
         tables = {"path_row": paths.table, "breakdown": parts.table, "delivery": losses.table}
         with registered(self.connection, **tables):
-            for name in ("open_end", "why_callback", "suspect"):
-                self.steps.keep(name, values)
-            verdict = internal_sql().run(self.connection, "verdict", values).to_arrow_table()
-        values["path"] = path = _worst(verdict, paths)
-        values["paths"] = [path] if self.place is None else paths.table["path"].to_pylist()
+            for kind in culprit_sql().names():
+                self.keep(culprit_sql().header(kind).reads, values)
+            self.steps.unite("culprit", culprit_sql(), values)
+            verdict = _with_next(
+                internal_sql().run(self.connection, "verdict", values).to_arrow_table()
+            )
+            paths = self.rows("worst_first", paths, values | {"path": _worst(verdict)})
+        values["path"] = path = paths.table["path"][0].as_py()
+        values["paths"] = paths.table["path"].to_pylist()
+        doubts = self.rows("doubt", paths, values)
         flow = self.ask("critical-path", times, to=self.place, via=[path], quantile="p95")
-        paths = self.rows("worst_first", paths, values)
         parts = self.rows("path_part", parts, values)
         losses = self.rows("own_loss", losses, values)
         values["callbacks"] = [[row["node"], row["what"]] for row in parts.table.to_pylist()]
         with registered(self.connection, piece=flow.table):
-            names = ("kept_input", "piece_to_ask", "callback_function")
-            kept, pieces, functions = (self.internal(name, values) for name in names)
+            names = ("piece_to_ask", "callback_function")
+            pieces, functions = (self.internal(name, values) for name in names)
         since = ["--start", str(times.start)] if times != asked else []
         shown: list[tuple[Header, Sequence[Mapping[str, Any]], Sequence[str]]] = [
-            (health_sql().header("dead_end"), kept, ()),
             (
                 health_sql().header("topic_unnamed"),
                 [values] if _UNNAMED in path.split(ARROW) else [],
@@ -142,7 +149,6 @@ class _Questions:
             ),
             (internal_sql().header("piece_to_ask"), pieces, since),
             (load_query("critical-path"), flow.table.to_pylist()[:1], ()),
-            (load_query("topics-delivery"), losses.table.to_pylist(), ()),
             (internal_sql().header("callback_function"), functions, since),
         ]
         steps = [
@@ -151,15 +157,13 @@ class _Questions:
             for row in rows
             if (words := header.next_command(row))
         ]
-        lacking = set(chain(*verdict["lacks"].to_pylist()))
         notes = [
-            *(cure for word, cure in _RECORDED_BY.items() if word in lacking),
+            *(cure for word, cure in _RECORDED_BY.items() if word in verdict["lacks"].to_pylist()),
             *(
                 f"without the first {start.removesuffix('s')} s, a warm-up: the longest latencies"
                 " lie there (--start 0s reads them, too)"
                 for start in since[1:]
             ),
-            *(row["detail"] for row in kept),
             *_outlier(self.run, paths.table.to_pylist()[0]),
             *paths.notes,
             *flow.notes,
@@ -170,6 +174,7 @@ class _Questions:
             start=times.start,
             place=self.place,
             verdict=replace(paths, table=verdict, header=None, notes=[], path_numbers={}),
+            doubts=replace(doubts, header=None, notes=[], path_numbers={}),
             paths=paths,
             nodes=self.rows("node_share", parts, values),
             slow_flow=self.rows("longest_piece", flow, values),
@@ -212,6 +217,13 @@ class _Questions:
             is_known=name != _FIRST,
         )
 
+    def keep(self, names: Iterable[str], values: Mapping[str, Any]) -> None:
+        """Make tables of statements of `schema/internal`, each after those that it reads."""
+        for name in names:
+            if name in internal_sql().names() and name not in self.steps:
+                self.keep(internal_sql().header(name).reads, values)
+                self.steps.keep(name, values)
+
     def internal(self, name: str, values: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Return the rows of a statement of `schema/internal`, none if it has nothing to read."""
         if not may_have_rows(self.connection, internal_sql().header(name).sources, values):
@@ -219,8 +231,8 @@ class _Questions:
         return list(internal_sql().rows(self.connection, name, values))
 
     def rows(self, name: str, of: QueryResult, values: Mapping[str, Any]) -> QueryResult:
-        """Return a result with the rows of a statement, which reads its table."""
-        (table,) = internal_sql().header(name).reads
+        """Return a result with the rows of a statement, which reads its table first."""
+        table, *_ = internal_sql().header(name).reads
         with registered(self.connection, **{table: of.table}):
             rows = internal_sql().run(self.connection, name, values).to_arrow_table()
         return replace(of, table=rows)
@@ -244,10 +256,21 @@ def _has_flows(paths: QueryResult) -> bool:
     return any(paths.table["pairs"].to_pylist())
 
 
-def _worst(verdict: pa.Table, paths: QueryResult) -> str:
-    """Return the path that the worst culprit delays, else the one that is slowest as a rule."""
-    slowest = max(paths.table.to_pylist(), key=lambda row: row["p95_ns"] or 0)
-    return str(next(filter(None, verdict["path"].to_pylist()), slowest["path"]))
+def _worst(verdict: pa.Table) -> str | None:
+    """Return the path that the worst culprit delays; None: it delays none of these."""
+    return next(filter(None, verdict["path"].to_pylist()), None)
+
+
+def _with_next(verdict: pa.Table) -> pa.Table:
+    """Return culprits with the words behind `msgflow` of the command that shows more of each."""
+    from msgflow.trace.numpy_arrow import texts_to_arrow
+
+    words = [
+        culprit_sql().header(row["kind"]).next_command(row) if row["kind"] else None
+        for row in verdict.to_pylist()
+    ]
+    lines = [None if one is None else shlex.join(one) for one in words]
+    return verdict.append_column("next", texts_to_arrow(lines))
 
 
 def _outlier(run: Run, path: Mapping[str, Any]) -> Iterator[str]:

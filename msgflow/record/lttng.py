@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 import subprocess
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -97,6 +98,16 @@ def ros_processes() -> list[tuple[str, int]]:
         if any(name.startswith("ros2:") for name in names):
             found.append((_text(process, "name"), int(_text(process, "id"))))
     return found
+
+
+def process_with_library() -> int | None:
+    """Return a process that has loaded the library with the tracepoints of ROS 2, if any has."""
+    for maps in Path("/proc").glob("[0-9]*/maps"):
+        # It ends meanwhile, or belongs to another user.
+        with suppress(OSError):
+            if "/libtracetools.so" in maps.read_text(errors="replace"):
+                return int(maps.parent.name)
+    return None
 
 
 def losses(session: str) -> int:

@@ -15,7 +15,7 @@ from typing import IO, TYPE_CHECKING
 from msgflow.errors import RecordingError
 from msgflow.record.daemon import session_daemon
 from msgflow.record.event_cost import measure_event_cost
-from msgflow.record.lttng import losses, ros_processes, sessions
+from msgflow.record.lttng import losses, process_with_library, ros_processes, sessions
 from msgflow.record.perf import recorded_samples, recorded_with_perf
 from msgflow.record.program import (
     Program,
@@ -49,7 +49,7 @@ _USUAL_BYTES_PER_SECOND = 100_000 * BYTES_OF_EVENT
 _USUAL_SECONDS = 600.0
 # Seconds.
 _BETWEEN_LOOKS = 0.5
-_UNTIL_FIRST_NODE = 5.0
+_BETWEEN_LOOKS_FOR_NODES = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,6 +181,9 @@ class _Watch:
     expects_nodes: bool
     has_failed: bool = False
     begin: float = field(default_factory=time.monotonic)
+    # Seconds after which nodes are looked for.
+    next_look: float = _BETWEEN_LOOKS_FOR_NODES
+    loaded_by: int | None = None  # process with the library of tracepoints at the latest look
 
     def __post_init__(self) -> None:
         self.status = Status(0.0, 0, 0, shutil.disk_usage(self.directory).free)
@@ -223,13 +226,28 @@ class _Watch:
                 "events are being discarded, the buffers are too small: record again with a"
                 f" --subbuf-size several times as large as {self.channel.sub_buffer_size}"
             )
-        if self.expects_nodes and passed >= _UNTIL_FIRST_NODE:
+        if self.expects_nodes and passed >= self.next_look:
+            self._look_for_nodes(passed)
+            self.next_look += _BETWEEN_LOOKS_FOR_NODES
+
+    def _look_for_nodes(self, passed: float) -> None:
+        """Tell nodes that are starting, which may take long, from nodes without tracepoints."""
+        before, self.loaded_by = self.loaded_by, process_with_library()
+        if ros_processes():
             self.expects_nodes = False
-            if not ros_processes():
+        elif self.loaded_by is None:
+            if self.next_look == _BETWEEN_LOOKS_FOR_NODES:
                 self.note(
-                    f"after {passed:.0f} s no process has the tracepoints of ROS 2: is tracing"
-                    " built in (ros2 run tracetools status), are nodes running?"
+                    f"after {passed:.0f} s no process has the tracepoints of ROS 2: nodes are still"
+                    " starting, or none is"
                 )
+        # One that has just loaded it has not told LTTng yet.
+        elif self.loaded_by == before:
+            self.expects_nodes = False
+            self.note(
+                f"process {before} uses ROS 2 without tracepoints: is tracing built in (ros2 run"
+                " tracetools status)?"
+            )
 
 
 def recorded_bytes(directory: Path) -> int:

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 from rich.cells import cell_len
 
 from msgflow.result.rows import is_number
+from msgflow.text.parts import PART_COLUMNS, part_words
 from msgflow.text.values import ARROW, MOMENT, NULL, column_title, format_cell, short_symbol
 from msgflow.text.wrapping import longest_piece, longest_word, wrap
 
@@ -171,6 +172,8 @@ def _column(result: Rows, name: str, values: pa.ChunkedArray, lines: int) -> Sho
     if name == RUN and names and len(set(names.values())) == len(names):
         title, has_numbers = "run", False
         cells = [format_cell(names.get(value, value)) for value in listed]
+    elif name in PART_COLUMNS and result.header is not None:
+        cells = [NULL if value is None else part_words(value) for value in listed]
     elif name in _SYMBOLS:
         cells = [NULL if value is None else format_cell(short_symbol(value)) for value in listed]
     else:

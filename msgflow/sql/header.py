@@ -133,6 +133,7 @@ SCHEMAS = {
     "public": "main",
     "health": "finding",
     "internal": "internal",
+    "culprit": "culprit",
 }
 # Fields of a header that have the text that stands there, or the names.
 _TEXTS = ("severity", "cause", "cure", "note")

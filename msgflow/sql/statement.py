@@ -108,6 +108,16 @@ class Statements:
         (statement,) = connection.extract_statements(text)
         connection.execute(statement, self._bound(name, statement, values))
 
+    def unite(
+        self, connection: duckdb.DuckDBPyConnection, table: str, values: Mapping[str, Any]
+    ) -> None:
+        """Make a temporary table of the rows of all statements: `kind` is the name of each."""
+        kinds = [name for name in self.names() if self.header(name).kind != "inline"]
+        rows = (f"SELECT '{name}' AS kind, *\nFROM (\n{self.text(name)}\n)" for name in kinds)
+        text = f"CREATE OR REPLACE TEMP TABLE {table} AS\n" + "\nUNION ALL BY NAME\n".join(rows)
+        (statement,) = connection.extract_statements(text)
+        connection.execute(statement, {key: values[key] for key in statement.named_parameters})
+
     def _bound(
         self, name: str, statement: duckdb.Statement, values: Mapping[str, Any]
     ) -> dict[str, Any]:
@@ -172,6 +182,12 @@ def registered(
 def internal_sql() -> Statements:
     """Return what the program asks for itself: rows that become files, pictures or sentences."""
     return Statements(resource_directory("schema") / "internal")
+
+
+@cache
+def culprit_sql() -> Statements:
+    """Return the kinds of culprits: what makes data late, or lets them get lost."""
+    return Statements(resource_directory("schema") / "culprit")
 
 
 @cache

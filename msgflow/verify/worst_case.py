@@ -29,14 +29,6 @@ def find_worst_case(
     return worst_case_of(rows[0]) if rows else {}
 
 
-def take_of(command: str | None) -> int | None:
-    """Return the take at the end of the flow that a command shows; None where it shows none."""
-    match shlex.split(command or ""):
-        case ["msgflow", "flow", "--take", identity]:
-            return int(identity)
-    return None
-
-
 def worst_case_of(row: Sequence[Any]) -> dict[str, Any]:
     """Return columns of a verdict: the worst case in a row of such a statement."""
     duration, at_ns, identity, kind = row

@@ -6,6 +6,7 @@ pull request or an issue, and the command line have the same numbers.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -29,7 +30,7 @@ from msgflow.sql.value import Value
 from msgflow.text.markdown import code, code_lines, markdown_line, rule_line
 from msgflow.text.shell import shell_joined
 from msgflow.text.values import format_cell
-from msgflow.trace.numpy_arrow import integers_to_arrow
+from msgflow.trace.numpy_arrow import integers_to_arrow, texts_to_arrow
 from msgflow.verify.verify import Verification
 from msgflow.view.page_query import Question
 from msgflow.view.table_encoding import encode_result
@@ -39,6 +40,8 @@ MOST_PATHS = 3
 _MOST_ROWS = 5
 # Places of each kind of finding in Markdown; `msgflow check` lists all of them.
 _MOST_PLACES = 3
+# Culprits in Markdown, as on the screen; `msgflow why --wide` lists all of them.
+_MOST_CULPRITS = 3
 _QUERIES = {
     "paths": ("e2e-latency", Selection(where="pairs > 0", sort=("max_ns:desc",), limit=MOST_PATHS)),
     "drops": (
@@ -67,7 +70,7 @@ class Kind(NamedTuple):
 
 
 _KINDS = {
-    "why": Kind("What makes data late, or lets them get lost", _NO_FLOW, ("sentence",)),
+    "why": Kind("What makes data late, or lets them get lost", _NO_FLOW, ("headline",)),
     "paths": Kind("Slowest paths", _NO_FLOW,
         ("path", "median_ns", "p99_ns", "max_ns", "reached", "roots")),
     "blame": Kind("Where the time of the slowest flows went", _NO_FLOW,
@@ -116,13 +119,29 @@ def query_section(asked: Question, name: str, through: str = "") -> Section:
 
 
 def why_section(asked: Question) -> Section:
-    """Return the verdict of `msgflow why`: a sentence for each culprit, the worst first."""
-    command = shell_joined(["msgflow", "why", *asked.options, "--run", asked.run.name])
+    """Return the culprits of `msgflow why`, the worst first; its notes are what is in doubt.
+
+    `next` of each is a whole command.
+    """
     try:
-        verdict = explain(asked.connection, asked.run, asked.slice).verdict
+        found = explain(asked.connection, asked.run, asked.slice)
     except NoFlowError:
-        return Section("why", QueryResult(pa.table({"sentence": pa.array([], pa.string())})), ())
-    return Section("why", verdict, (command,))
+        return Section("why", QueryResult(pa.table({"headline": pa.array([], pa.string())})), ())
+    table = found.verdict.table
+    commands = [text and _command(asked, shlex.split(text)) for text in table["next"].to_pylist()]
+    place = table.column_names.index("next")
+    verdict = replace(
+        found.verdict,
+        table=table.set_column(place, "next", texts_to_arrow(commands)),
+        notes=found.doubts.table["sentence"].to_pylist(),
+    )
+    return Section("why", verdict, (_command(asked, ["why"]),))
+
+
+def _command(asked: Question, words: Sequence[str]) -> str:
+    # Findings are of whole runs.
+    options = [] if words[0] == "check" else asked.options
+    return shell_joined(["msgflow", *words, *options, "--run", asked.run.name])
 
 
 def area_section(asked: Question, name: str, of: Sequence[str | int]) -> Section:
@@ -237,7 +256,7 @@ def _section(section: Section) -> Iterator[str]:
         reading = code(section.reading) if section.name == "change" else f"{section.reading}."
         yield from (reading, "")
     if len(section.result):
-        lines = {"blame": _flows, "why": _sentences}.get(section.name, _table)
+        lines = {"blame": _flows, "why": _culprits}.get(section.name, _table)
         yield from lines(section)
     elif not section.reading:
         yield from (section.kind.when_empty, "")
@@ -260,10 +279,20 @@ def _table(section: Section) -> Iterator[str]:
     yield ""
 
 
-def _sentences(section: Section) -> Iterator[str]:
-    for sentence in section.result.table["sentence"].to_pylist():
-        yield f"- {code(sentence)}"
+def _culprits(section: Section) -> Iterator[str]:
+    """Yield a headline for each culprit, and below it what shows it, and what shows more."""
+    rows = section.result.table.to_pylist()
+    for row in rows[:_MOST_CULPRITS]:
+        yield f"- **{code(row['headline'])}**"
+        for line in row["evidence"]:
+            yield f"  - {code(line)}"
+        if row["next"] is not None:
+            yield f"  - next: {code(row['next'])}"
+    if len(rows) > _MOST_CULPRITS:
+        yield f"- and {len(rows) - _MOST_CULPRITS} more"
     yield ""
+    for note in section.result.notes:
+        yield from (f"note: {code(note)}", "")
 
 
 def _flows(section: Section) -> Iterator[str]:

@@ -14,17 +14,13 @@ from msgflow.query.runner import run_query
 from msgflow.query.why import explain
 from msgflow.run.slice import Slice
 from msgflow.run.window import Window
-from msgflow.sql.statement import internal_sql, registered
-from msgflow.text.values import format_duration
+from msgflow.text.values import ARROW, format_duration
 from msgflow.verify.metrics import ENDS
 from msgflow.verify.targets_file import TargetsFile
 from msgflow.verify.verify import Verdict, verify
-from msgflow.verify.worst_case import take_of
 
 Row = dict[str, Any]
 
-# What is said of the causes of what fails: of its worst case, and of the whole window.
-_CAUSES = ("culprit", "why")
 # A requirement has the first of these that a window gave it.
 _STRONGEST = (Verdict.FAILED, Verdict.PASSED, Verdict.NO_DATA, Verdict.NOT_MEASURED)
 
@@ -39,7 +35,7 @@ class _Told:
 
     worst_ns: int  # the worst case so far; 0 of requirements that have no worst case
     until_ns: int  # until when all was judged
-    causes: Row  # those that were told of it
+    culprit: Row | None  # which was told of it
 
     def is_surpassed(self, worst_ns: int | None, at_ns: int | None) -> bool:
         is_later = at_ns is not None and at_ns >= self.until_ns
@@ -84,8 +80,8 @@ class Alarm:
         """Verify a window, of whose times those from `final_ns` on are not final yet.
 
         It returns what is violated there and was not before; and the rows of `verify`, each with
-        `culprit` and `why` of what fails, and as `flows` the row of `e2e-latency` of a path if
-        asked for.
+        `culprit`, the row of `msgflow why` that is to blame for what fails, and as `flows` the row
+        of `e2e-latency` of a path if asked for.
         """
         part = Slice(start=window.start_ns, end=window.end_ns)
         rows = verify(con, self.targets, part, paths=self.paths).result.table.to_pylist()
@@ -96,20 +92,19 @@ class Alarm:
             verdict = Verdict(row["verdict"])
             before = self._verdicts.get(_key(row), verdict)
             self._verdicts[_key(row)] = min(before, verdict, key=_STRONGEST.index)
-            row |= dict.fromkeys(_CAUSES) | {"flows": self._flows(con, row, part)}
+            row |= {"culprit": None, "flows": self._flows(con, row, part)}
             if verdict != Verdict.FAILED:
                 continue
             key = tuple(row[name] for name in ("target", "metric", "condition", "subject", "path"))
             told = self._failing.get(key)
             if told is None or told.is_surpassed(row["worst_ns"], row["worst_at_ns"]):
                 culprits = _culprits(con, part) if culprits is None else culprits
-                violation = self._violation(con, row, part, final_ns)
-                found.append(violation | {"why": _why(culprits, row["path"])})
-                row |= {name: found[-1][name] for name in _CAUSES}
+                row["culprit"] = _culprit_of(row, culprits)
+                found.append(_violation(row, final_ns))
             else:
-                row |= told.causes
+                row["culprit"] = told.culprit
             worst_ns = max(row["worst_ns"] or 0, 0 if told is None else told.worst_ns)
-            failing[key] = _Told(worst_ns, window.end_ns, {name: row[name] for name in _CAUSES})
+            failing[key] = _Told(worst_ns, window.end_ns, row["culprit"])
         self._failing = failing
         self._note_silence(rows)
         return found, rows
@@ -143,27 +138,20 @@ class Alarm:
                 self.note(f"no data of {name}: {row['metric']} {row['condition']}: {row['reason']}")
         self._silent = silent
 
-    @staticmethod
-    def _violation(con: duckdb.DuckDBPyConnection, row: Row, part: Slice, final_ns: int) -> Row:
-        take_id, culprit = take_of(row["see"]), None
-        if take_id is not None:
-            asked = {"take": take_id, **_ends(row["path"])}
-            pieces = run_query(con, load_query("critical-path"), asked, part).table
-            with registered(con, piece=pieces):
-                asked = {"path": row["path"]}
-                ((culprit,),) = internal_sql().run(con, "blamed", asked).fetchall()
-        at_ns = row["worst_at_ns"]
-        return {
-            "subject": row["subject"] or row["target"],
-            "path": row["path"],
-            "metric": row["metric"],
-            "condition": row["condition"],
-            "measured": row["measured"],
-            "worst_ns": row["worst_ns"],
-            "at_ns": at_ns,
-            "is_final": at_ns is None or at_ns < final_ns,
-            "culprit": culprit,
-        }
+
+def _violation(row: Row, final_ns: int) -> Row:
+    at_ns = row["worst_at_ns"]
+    return {
+        "subject": row["subject"] or row["target"],
+        "path": row["path"],
+        "metric": row["metric"],
+        "condition": row["condition"],
+        "measured": row["measured"],
+        "worst_ns": row["worst_ns"],
+        "at_ns": at_ns,
+        "is_final": at_ns is None or at_ns < final_ns,
+        "culprit": row["culprit"],
+    }
 
 
 def _key(row: Row) -> tuple[str, str, str]:
@@ -171,7 +159,7 @@ def _key(row: Row) -> tuple[str, str, str]:
 
 
 def _culprits(con: duckdb.DuckDBPyConnection, part: Slice) -> list[Row]:
-    """Return what `msgflow why` says first of a window, the worst culprit first."""
+    """Return what `msgflow why` says of a window, the worst culprit first."""
     try:
         found = explain(con, part.one_run(con, "an alarm"), part)
     except NoFlowError:
@@ -180,11 +168,24 @@ def _culprits(con: duckdb.DuckDBPyConnection, part: Slice) -> list[Row]:
     return rows
 
 
-def _why(culprits: Sequence[Row], path: str | None) -> str | None:
-    """Return the sentence of the worst culprit on a path, which may be part of a longer one."""
-    for row in culprits:
-        if path and row["cost_ns"] is not None and f" → {path} → " in f" → {row['path']} → ":
-            return str(row["sentence"])
+def _culprit_of(row: Row, culprits: Sequence[Row]) -> Row | None:
+    """Return the worst culprit on the way that a requirement is about.
+
+    Of two ends the steps between are those of the path that the culprit delays. Where nothing
+    stands out, the only row has the slowest path: the way may be part of that.
+    """
+    ends = (row["path"] or row["subject"] or "").split(ARROW)
+    for culprit in culprits:
+        if culprit["kind"] is None:
+            return culprit if {*ends} <= {*(culprit["path"] or "").split(ARROW)} else None
+        steps = (row["path"] or culprit["path"] or "").split(ARROW)
+        if ends[0] not in steps or ends[-1] not in steps:
+            continue
+        # What the first node does before it publishes is not on the way.
+        way = steps[steps.index(ends[0]) + 1 : len(steps) - steps[::-1].index(ends[-1])]
+        # The rate of a topic, which is the last step then, is not changed by who takes it.
+        if culprit["node"] in way or culprit["topic_name"] in way[:-1]:
+            return culprit
     return None
 
 
@@ -197,10 +198,10 @@ def violation_line(violation: Row) -> str:
         f"{violation['subject']}: {violation['metric']} {violation['measured']}{longest}, required"
         f" {violation['condition']}"
     )
-    if violation["culprit"]:
-        words += f": {violation['culprit']}"
-    if violation["why"]:
-        words += f"; why: {violation['why']}"
+    if (culprit := violation["culprit"]) is not None:
+        words += f": {culprit['headline']}"
+        if culprit["kind"] is None:
+            words += "".join(f": {line}" for line in culprit["evidence"])
     if violation["path"] and violation["path"] != violation["subject"]:
         words += f" — {violation['path']}"
     return words if violation["is_final"] else f"{words} (provisional)"

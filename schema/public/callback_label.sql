@@ -17,6 +17,8 @@ SELECT
         )
         WHEN 'subscription' THEN printf('Subscription(%s)', coalesce(s.topic_name, '?'))
         WHEN 'service' THEN printf('Service(%s)', coalesce(v.service_name, '?'))
+        WHEN 'action' THEN
+            printf('Action(%s)', regexp_replace(v.service_name, '/_action/send_goal$', ''))
         WHEN 'function' THEN replace(regexp_replace(c.symbol, '^[^:]*:', ''), '.<locals>', '')
         ELSE printf('Callback(0x%x)', c.callback_handle)
     END AS label,

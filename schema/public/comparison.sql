@@ -64,6 +64,11 @@ WITH path_chain AS MATERIALIZED (
         [run_a, run_b], from_topic, to_topic, max_depth := max_depth, max_paths := max_paths
     )
 ),
+named_path AS MATERIALIZED (
+    SELECT path_id, alike_id, path, is_cut, topics
+    FROM main.flow_path([run_a, run_b], chains := 'path_chain')
+    WHERE is_path
+),
 flow AS (
     SELECT
         e.*, p.path, p.is_cut,
@@ -71,9 +76,10 @@ flow AS (
         p.topics[-1] AS last_topic
     FROM main.end_to_end(
         [run_a, run_b], from_topic, to_topic, 'callback_start', 'callback_end',
-        (-9223372036854775808)::BIGINT, 9223372036854775807, chains := 'path_chain'
+        (-9223372036854775808)::BIGINT, 9223372036854775807, chains := 'path_chain',
+        paths := 'named_path'
     ) AS e
-    JOIN main.flow_path([run_a, run_b], chains := 'path_chain') AS p ON e.path_id = p.path_id
+    JOIN named_path AS p ON e.path_id = p.path_id
     WHERE what IN ('paths', 'ends')
 ),
 outcome AS (

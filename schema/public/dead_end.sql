@@ -5,7 +5,10 @@
 --     from what the node publishes itself; if messages on another topic led to publications before
 --     the first one came, or in shorter callbacks, as keeping takes less time than using; or if
 --     what comes outside of callbacks does not answer them one by one. Topics of ROS, topics that
---     the node also publishes on, and inputs of annotations are left out.
+--     the node also publishes on, and inputs of annotations are left out. So are outputs that
+--     report on the node: a timer publishes them at most twice a second, nothing follows from them
+--     elsewhere, and other nodes publish there, too (/diagnostics), or the node has faster outputs
+--     and no node that publishes takes them.
 -- grain: one row per such subscription, publisher of its node, and timer or subscription whose
 --     callbacks published; one row for what it published outside of callbacks
 -- param: runs
@@ -89,7 +92,7 @@ published AS MATERIALIZED (
     ANTI JOIN caused AS l ON b.publication_id = l.publication_id
     WHERE list_contains(runs, b.run_id) AND NOT p.is_internal AND p.topic_name IS NOT NULL
 ),
-output AS (
+every_output AS MATERIALIZED (
     SELECT
         d.run_id, d.node_id, d.subscription_id, d.message_count, d.run_ns, p.publisher_id,
         p.timer_id, p.trigger_id,
@@ -99,6 +102,48 @@ output AS (
     FROM idle AS d
     JOIN published AS p ON d.node_id = p.node_id
     GROUP BY ALL
+),
+slow_output AS MATERIALIZED (
+    SELECT o.node_id, o.publisher_id, p.topic_name
+    FROM every_output AS o
+    JOIN store.publisher AS p ON o.publisher_id = p.publisher_id
+    LEFT JOIN store.timer AS t ON o.timer_id = t.timer_id
+    GROUP BY o.node_id, o.publisher_id, p.topic_name
+    HAVING bool_and(2 * t.period_ns >= 1_000_000_000) AND count(o.trigger_id) = 0
+),
+report AS (
+    SELECT s.publisher_id
+    FROM slow_output AS s
+    WHERE s.topic_name NOT IN (
+        SELECT i.topic_name
+        FROM store.flow_hop AS h
+        JOIN store.subscription AS i ON h.from_subscription_id = i.subscription_id
+        WHERE list_contains(runs, h.run_id) AND i.topic_name IS NOT NULL
+    )
+        AND (
+            EXISTS (
+                FROM store.publisher AS p
+                WHERE list_contains(runs, p.run_id)
+                    AND p.topic_name = s.topic_name AND p.node_id <> s.node_id
+            )
+            OR (
+                s.node_id IN (
+                    SELECT node_id
+                    FROM every_output
+                    WHERE publisher_id NOT IN (SELECT publisher_id FROM slow_output)
+                )
+                AND NOT EXISTS (
+                    FROM store.subscription AS i
+                    JOIN store.publisher AS p ON i.node_id = p.node_id
+                    WHERE list_contains(runs, p.run_id)
+                        AND i.topic_name = s.topic_name AND NOT p.is_internal
+                )
+            )
+        )
+),
+output AS (
+    FROM every_output AS o
+    ANTI JOIN report AS r ON o.publisher_id = r.publisher_id
 ),
 -- One after the other, and few that wait at the end.
 queue AS (

@@ -10,6 +10,7 @@
 -- param: chains
 -- column: run_id
 -- column: path_id BIGINT  Number of the chain in this result
+-- column: alike_id
 -- column: parent_path_id, depth
 -- column: publishers BIGINT[]  Publishers in order; below 0: not traced
 -- column: subscriptions, topics
@@ -108,7 +109,9 @@ whole AS (
     GROUP BY l.path_id
 )
 SELECT
-    c.run_id, c.path_id, c.parent_path_id, c.depth, w.publishers, w.subscriptions, w.topics,
+    c.run_id, c.path_id,
+    min(c.path_id) OVER (PARTITION BY c.run_id, c.is_path, w.path) AS alike_id,
+    c.parent_path_id, c.depth, w.publishers, w.subscriptions, w.topics,
     w.routes, w.path, c.publisher_id, c.subscription_id, c.is_cached, c.is_path, c.is_cut
 FROM chain AS c
 JOIN whole AS w ON c.path_id = w.path_id

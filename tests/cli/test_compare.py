@@ -73,7 +73,11 @@ def test_two_times_of_one_run(msgflow: Msgflow, database: Path) -> None:
 
 def test_the_exit_code_tells_whether_a_condition_holds(msgflow: Msgflow, database: Path) -> None:
     assert msgflow("compare", 1, 2, "--fail-on", "p95>5%", "--db", database).exit_code == 0
-    worse = msgflow("compare", 2, 1, "--fail-on", "median>1%,p95>5%", "--db", database)
+    conditions = ("compare", 2, 1, "--fail-on", "median>1%,p95>5%", "--db", database)
+    chance = msgflow(*conditions)
+    assert chance.exit_code == 0
+    assert "1 difference beyond a limit may be chance: --even-by-chance counts" in chance.stderr
+    worse = msgflow(*conditions, "--even-by-chance")
     assert worse.exit_code == 1
     assert worse.stdout
     errors = [line for line in worse.stderr.splitlines() if line.startswith("error: ")]

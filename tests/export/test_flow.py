@@ -114,9 +114,8 @@ def test_what_a_busy_executor_added_is_said(empty_database: Path, tmp_path: Path
                 assert bounds == [(9_700_000, 29_600_000)]
     assert lines == {
         "/a": "publish to take 14.150 ms  take to callback 50.000 µs",
-        "/b": "publish to take 35.250 ms  executor busy up to 29.700 ms"
-        "  take to callback 50.000 µs",
-        "/c": "publish to take 30.350 ms  executor busy 9.700 ms to 29.600 ms"
+        "/b": "publish to take 35.250 ms  in the queue up to 29.700 ms  take to callback 50.000 µs",
+        "/c": "publish to take 30.350 ms  in the queue 9.700 ms to 29.600 ms"
         "  take to callback 50.000 µs",
     }
 

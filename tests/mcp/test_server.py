@@ -109,7 +109,11 @@ def test_a_flow_is_a_tree(small_database: Path) -> None:
 @pytest.mark.thorough
 def test_why_compare_and_verify(robot_database: Path) -> None:
     why = one(robot_database, "why")
-    assert {"paths", "nodes"} <= {row["section"] for row in why["rows"]}
+    first, *others = why["rows"]
+    assert first["section"] == "verdict"
+    named = {"rank", "node", "callback", "function", "kind", "harm_ns", "evidence", "next"}
+    assert named | {"headline"} <= first.keys()
+    assert {"paths", "nodes"} <= {row["section"] for row in others}
     compared = one(robot_database, "compare", window=["0s..1s", "1s..2s"], what="topics")
     assert {"a_median_ns", "b_median_ns"} <= set(compared["rows"][0])
     topic = one(robot_database, "run_query", name="topics")["rows"][0]["topic_name"]

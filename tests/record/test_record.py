@@ -102,7 +102,11 @@ def test_from_a_robot_to_an_answer(record: Record, robot: list[str], tmp_path: P
     assert [path.name for path in (tmp_path / "trace").iterdir()] == ["ust"]
     with Database(tmp_path / "msgflow.duckdb") as database:
         (clock,) = database.query("clocks").to_arrow().to_pylist()
+        (first, *_) = database.why().verdict.table.to_pylist()
     assert clock["offset_ns"] == -12_500
+    # What is slow, then the paths.
+    shown = " ".join(ended.out.split())
+    assert shown.index(first["headline"]) < shown.index("/camera → /image → /detector")
 
 
 @pytest.mark.thorough
@@ -187,10 +191,30 @@ def test_discarded_events_are_said_at_once(record: Record, robot: list[str]) -> 
 
 
 @pytest.mark.thorough
-def test_a_program_without_tracepoints_is_noticed(record: Record) -> None:
-    ended = record("--duration", "6", "--no-ingest", "--", "sleep", "60")
+def test_a_program_without_tracepoints_is_noticed(record: Record, tmp_path: Path) -> None:
+    """Also one that has loaded a library without any."""
+    ended = record("--duration", "6", "--no-ingest", "-o", "first", "--", "sleep", "60")
     assert ended.exit_code == 0
-    assert "no process has the tracepoints of ROS 2" in ended.err
+    assert "no process has the tracepoints of ROS 2: nodes are still starting" in ended.err
+    assert "is tracing built in" not in ended.err
+    (tmp_path / "libtracetools.so").write_bytes(b"none")
+    loads = (
+        "import mmap, time; file = open('libtracetools.so', 'r+b');"
+        " library = mmap.mmap(file.fileno(), 0); time.sleep(60)"
+    )
+    words = ("--duration", "11", "--no-ingest", "-o", "second")
+    ended = record(*words, "--", sys.executable, "-c", loads)
+    assert ended.exit_code == 0
+    assert "uses ROS 2 without tracepoints: is tracing built in" in " ".join(ended.err.split())
+
+
+def test_what_a_program_prints_at_its_end_stands_before_the_answer(record: Record) -> None:
+    """Such as the tracebacks of nodes that Ctrl-C ended."""
+    ends = "trap 'sleep 1; echo KeyboardInterrupt >&2; exit' INT; while :; do sleep 0.1; done"
+    ended = record("--duration", "1", "--no-ingest", "--", "sh", "-c", ends)
+    said = ended.err.splitlines()
+    assert said[-1].startswith("recorded into ")
+    assert "KeyboardInterrupt" in said[:-1]
 
 
 @pytest.mark.thorough

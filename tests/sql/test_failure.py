@@ -195,7 +195,7 @@ def test_a_full_disk_after_the_commit_is_a_warning(
     ingested: Path, trace: Path, small_disk: Callable[[int], Path]
 ) -> None:
     """The run is in the log, and is read from there."""
-    path = small_disk(ingested.stat().st_size // 1_000_000 + 3) / "a.duckdb"
+    path = small_disk(ingested.stat().st_size // 1_000_000 + 2) / "a.duckdb"
     shutil.copyfile(ingested, path)
     report = ingest([trace], path, name="again", replace=True)
     assert len(report.warnings) == 1
@@ -207,7 +207,7 @@ def test_a_full_disk_after_the_commit_is_a_warning(
     assert sorted(os.listdir(path.parent)) == ["a.duckdb", "a.duckdb.wal"]
 
 
-@pytest.mark.parametrize("megabytes", few([1, 6], 1))
+@pytest.mark.parametrize("megabytes", few([1, 4], 1))
 def test_a_full_disk_leaves_no_new_database(
     trace: Path, small_disk: Callable[[int], Path], megabytes: int
 ) -> None:

@@ -15,7 +15,9 @@ from msgflow.view.page_query import DIRECTORY, page_query
 TESTS = Path(__file__).resolve().parents[1]
 FILES = sql_files()
 QUERIES = [file for file in FILES if file.layer == "queries"]
-INTERNAL = [file for file in FILES if file.layer == "internal" and file.header.kind != "inline"]
+OF_PROGRAM = [
+    file for file in FILES if file.layer in ("internal", "culprit") and file.header.kind != "inline"
+]
 PUBLIC = [file for file in FILES if file.layer == "public"]
 # Those of kind 'inline' are parts of others.
 PAGE_QUERIES = sorted(
@@ -55,7 +57,7 @@ def test_every_public_view_with_logic_has_a_case(file: SqlFile) -> None:
     assert cases(TESTS / "schema" / "cases" / file.header.name)
 
 
-@each(INTERNAL)
+@each(OF_PROGRAM)
 def test_everything_that_the_program_asks_has_a_case(file: SqlFile) -> None:
     assert cases(TESTS / "schema" / "cases" / file.header.name)
 

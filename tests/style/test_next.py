@@ -12,6 +12,7 @@ from support.sql_files import SqlFile, sql_files
 from msgflow.cli.app import app
 from msgflow.db.store_table import store_tables
 from msgflow.query.catalogue import load_query
+from msgflow.sql.statement import internal_sql
 
 FILES = [file for file in sql_files() if file.header.next]
 
@@ -37,9 +38,11 @@ def test_the_next_command_is_one_of_the_program(file: SqlFile) -> None:
 
 @each(FILES)
 def test_the_next_command_names_columns_of_the_row(file: SqlFile) -> None:
-    """A finding is stored, so its row has the columns of the table."""
+    """A finding is stored, so its row has the columns of the table; a culprit is in the verdict."""
     known = {column.name for column in file.header.columns}
     if file.layer == "health":
         known |= store_tables()["finding"].columns.keys()
+    elif file.layer == "culprit":
+        known |= {column.name for column in internal_sql().header("verdict").columns}
     named = {name for words in file.header.next for name in re.findall(r"\{(\w+)\}", str(words))}
     assert named <= known

@@ -19,12 +19,13 @@
         == expected          the output in order; leave it empty for a new case, then let
                              `pytest --update-golden` write it, and read what it wrote
 
-A query is run as `Database.query` runs it; what the program asks for itself (internal.<name>) of
-run 1, likewise over tables of scratch, sorted where it has no order; a page query (view.<name>) of
-run 1, with times from 0 and a window of 4000 ns where the parameters say nothing else; a view (its
-full name, such as `main.node`) or a finding (`finding.NAME`) is read whole, a table macro called
-with its arguments, all sorted by all columns. An empty field is NULL, "" is an empty text. Lines
-that begin with # are comments. Tables of BASE that a case leaves out have one row, of key 1.
+A query is run as `Database.query` runs it; what the program asks for itself (internal.<name>, or
+culprit.<kind>) of run 1, likewise over tables of scratch and the limits of `noticed`, sorted where
+it has no order; a page query (view.<name>) of run 1, with times from 0 and a window of 4000 ns
+where the parameters say nothing else; a view (its full name, such as `main.node`) or a finding
+(`finding.NAME`) is read whole, a table macro called with its arguments, all sorted by all columns.
+An empty field is NULL, "" is an empty text. Lines that begin with # are comments. Tables of BASE
+that a case leaves out have one row, of key 1.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ from msgflow.query.runner import run_query
 from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import Slice
 from msgflow.sql.quoting import literal
-from msgflow.sql.statement import RECORDED, Statements, internal_sql
+from msgflow.sql.statement import RECORDED, Statements, culprit_sql, internal_sql
 from msgflow.view.page_query import DIRECTORY, Scratch, run_page_query
 
 Rows = list[list[str | None]]
@@ -81,7 +82,8 @@ FLOW = tuple(
 _NEUTRAL = {"VARCHAR": "", "BOOLEAN": "false", "TIMESTAMP": "1970-01-01"}
 _SLICE = tuple(field.name for field in fields(Slice))
 _PAGE_QUERY = "view."
-_INTERNAL = "internal."
+# What the program asks for itself, by the schema of its names.
+_OF_PROGRAM = {"internal": internal_sql, "culprit": culprit_sql}
 _FINDING = "finding."
 # What the cases of all findings show; a column of the place only where a row has it.
 _OF_FINDINGS = ("run_id", "trace_id", "name", "subject", "count", "detail")
@@ -356,8 +358,9 @@ def _text_of(name: str) -> str:
         pages = Statements(DIRECTORY)
         page = name.removeprefix(_PAGE_QUERY)
         return "\n".join(map(pages.text, ("window_ids", page) if page == "links" else (page,)))
-    if name.startswith(_INTERNAL):
-        return internal_sql().text(name.removeprefix(_INTERNAL))
+    schema, _, own_name = name.partition(".")
+    if schema in _OF_PROGRAM:
+        return _OF_PROGRAM[schema]().text(own_name)
     if name.startswith(_FINDING):
         return "\n".join(header.body for header in kinds() if header.name == name)
     return name if "." in name else "\n".join(load_query(name).statements)
@@ -483,8 +486,10 @@ def _result(connection: duckdb.DuckDBPyConnection, name: str, case: Case) -> Que
     given = dict(case.parameters or {})
     if name.startswith(_PAGE_QUERY):
         return QueryResult(_page_rows(connection, case, name.removeprefix(_PAGE_QUERY), given))
-    if name.startswith(_INTERNAL):
-        return QueryResult(_internal_rows(connection, case, name.removeprefix(_INTERNAL), given))
+    schema, _, own_name = name.partition(".")
+    if schema in _OF_PROGRAM:
+        statements = _OF_PROGRAM[schema]()
+        return QueryResult(_program_rows(connection, case, statements, own_name, given))
     if name.startswith(_FINDING):
         return QueryResult(_finding_rows(connection, name, given))
     if "." in name:
@@ -503,12 +508,19 @@ def _make_scratch(connection: duckdb.DuckDBPyConnection, case: Case) -> None:
         _create(connection, f"TEMP TABLE {table}", text)
 
 
-def _internal_rows(
-    connection: duckdb.DuckDBPyConnection, case: Case, name: str, given: dict[str, Any]
+def _program_rows(
+    connection: duckdb.DuckDBPyConnection,
+    case: Case,
+    statements: Statements,
+    name: str,
+    given: dict[str, Any],
 ) -> pa.Table:
     _make_scratch(connection, case)
-    rows = internal_sql().run(connection, name, _FRAME | given)
-    is_ordered = re.search("^ORDER BY", internal_sql().text(name), re.MULTILINE)
+    text = statements.text(name)
+    if re.search(r"\bnoticed\b", text):
+        internal_sql().keep(connection, "noticed", {})
+    rows = statements.run(connection, name, _FRAME | given)
+    is_ordered = re.search("^ORDER BY", text, re.MULTILINE)
     return (rows if is_ordered else rows.order("ALL")).to_arrow_table()
 
 

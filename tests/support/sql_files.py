@@ -13,7 +13,7 @@ from msgflow.sql.header import Header, read
 # From left to right: an object reads only its own layer and those to its left.
 LAYERS = (
     "alignment", "model", "kernel", "arrival", "overlap", "store", "link", "clock", "delivery",
-    "flow", "stat", "public", "health", "queries", "internal",
+    "flow", "stat", "public", "health", "queries", "internal", "culprit",
 )  # fmt: skip
 
 

@@ -6,7 +6,9 @@ import json
 import shlex
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
+import pyarrow as pa
 import pytest
 from support.hostile import HOSTILE, renamed
 from support.served import Page, Served, shown
@@ -16,6 +18,7 @@ from typer.testing import CliRunner
 from msgflow.cli.app import app
 from msgflow.database import open_db
 from msgflow.errors import UsageError
+from msgflow.result.query_result import QueryResult
 from msgflow.text.json_value import json_value
 from msgflow.view.page_query import Question
 from msgflow.view.pages import SUMMARY, Pages
@@ -53,6 +56,11 @@ def test_its_numbers_are_those_of_the_command_beside_them(part: str, dropping: P
         # The command has the verdict before the sections that it stands on.
         rows = printed(*found.commands, dropping)["verdict"]  # type: ignore[call-overload]
     own = found.result.table.to_pylist()
+    if part == "why":
+        # Words behind `msgflow` there; beside a table commands are whole.
+        run = found.commands[0].removeprefix("msgflow why")
+        for row in rows:
+            row["next"] = row["next"] and f"msgflow {row['next']}{run}"
     if part == "blame":
         # Each command is of one flow, and ranks it first.
         assert [row.pop("rank") for row in own] == sorted(
@@ -117,6 +125,86 @@ def test_markdown_has_verdicts_findings_paths_and_drops(dropping: Path, tmp_path
     assert "the run has no such topic — /nowhere" in text
 
 
+@pytest.fixture
+def explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`why` finds four culprits, and something that the recording cannot tell."""
+    nexts = ("query timers --node /a", "check", None, None)
+    rows = [
+        {
+            "kind": "sleeps",
+            "headline": f"/{name}: on_scan sleeps 160 ms",
+            "evidence": [f"data are late by {name}", f"{name} waits for it"],
+            "next": following,
+        }
+        for name, following in zip("abcd", nexts, strict=True)
+    ]
+    found = SimpleNamespace(
+        verdict=QueryResult(pa.Table.from_pylist(rows)),
+        doubts=QueryResult(pa.table({"sentence": ["/a: its clock jumps"]})),
+    )
+    monkeypatch.setattr("msgflow.view.summary.explain", lambda *_: found)
+
+
+@pytest.mark.usefixtures("explained")
+def test_markdown_has_a_headline_for_each_culprit(dropping: Path, tmp_path: Path) -> None:
+    """Three of them; findings are of whole runs."""
+    output = tmp_path / "summary.md"
+    with open_db(dropping) as opened:
+        opened.report(output, start="0.1s")
+    expected = """
+- **`/a: on_scan sleeps 160 ms`**
+  - `data are late by a`
+  - `a waits for it`
+  - next: `msgflow query timers --node /a --start 0.1s --run trace`
+- **`/b: on_scan sleeps 160 ms`**
+  - `data are late by b`
+  - `b waits for it`
+  - next: `msgflow check --run trace`
+- **`/c: on_scan sleeps 160 ms`**
+  - `data are late by c`
+  - `c waits for it`
+- and 1 more
+
+note: `/a: its clock jumps`
+
+```
+msgflow why --start 0.1s --run trace
+```
+"""
+    assert expected in output.read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("explained")
+def test_the_first_page_has_a_block_for_each_culprit(
+    dropping: Path, page: Page, tmp_path: Path
+) -> None:
+    output = tmp_path / "report.html"
+    with open_db(dropping) as opened:
+        opened.report(output)
+    page.open(output.as_uri())
+    why = page.page.locator("section", has_text="What makes data late")
+    blocks = why.locator(".culprit")
+    assert [blocks.nth(at).locator("p").all_inner_texts() for at in range(3)] == [
+        [
+            "/a: on_scan sleeps 160 ms",
+            "data are late by a",
+            "a waits for it",
+            "next: msgflow query timers --node /a --run trace",
+        ],
+        [
+            "/b: on_scan sleeps 160 ms",
+            "data are late by b",
+            "b waits for it",
+            "next: msgflow check --run trace",
+        ],
+        ["/c: on_scan sleeps 160 ms", "data are late by c", "c waits for it"],
+    ]
+    assert not blocks.nth(3).is_visible()
+    why.get_by_text("1 more").click()
+    assert blocks.nth(3).is_visible()
+    assert why.locator(".notes").inner_text() == "/a: its clock jumps"
+
+
 @pytest.mark.thorough
 def test_threads_are_named_by_their_nodes(dropping: Path, tmp_path: Path) -> None:
     """Each process of rclpy is python3."""
@@ -136,7 +224,9 @@ def test_markdown_of_some_paths_is_about_these(dropping: Path, tmp_path: Path) -
         text = paths[0].split(" → ")[1]
         report = opened.report(output, through=text)
         assert f"Its slowest paths are those with {text} (--through)." in report.notes
-        rows = [line for line in output.read_text("utf-8").splitlines() if " → " in line]
+        # What `why` says is of the run.
+        slowest = output.read_text("utf-8").partition("## Slowest paths")[2]
+        rows = [line for line in slowest.splitlines() if " → " in line]
         assert rows
         assert all(text in row for row in rows)
         with pytest.raises(UsageError, match="no path has this text"):

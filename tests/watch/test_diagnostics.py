@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from msgflow.cli.app import app
 from msgflow.errors import UsageError
 from msgflow.run.window import Window
+from msgflow.watch.alarm import violation_line
 from msgflow.watch.diagnostics import Diagnostics
 from msgflow.watch.window_report import WindowReport
 
@@ -28,8 +29,7 @@ ROW = {
     "worst_ns": 70_000_000,
     "reason": None,
     "path": PATH,
-    "culprit": "/detector ran 60.000 ms",
-    "why": None,
+    "culprit": {"kind": "callback", "headline": "/detector: on_image takes 60 ms"},
     "flows": {"median_ns": 50_000_000, "p99_ns": 61_000_000, "lost": 2, "dropped": 1},
 }
 
@@ -88,7 +88,7 @@ def test_a_target_is_a_status(published: list[Any]) -> None:
     passed = ROW | {"verdict": "passed", "target": "scan", "culprit": None, "flows": None}
     silent = passed | {"verdict": "no data", "target": "imu", "value": None, "reason": "silent"}
     unknown = silent | {"verdict": "not measured", "target": "odom", "reason": "events are missing"}
-    failed = ROW | {"verdict": "failed", "why": "the CPU is busy"}
+    failed = ROW | {"verdict": "failed"}
     with closing(Diagnostics()) as diagnostics:
         diagnostics.show(report(passed | {"target": "image"}, failed, passed, silent, unknown))
     node, message, *ended = published
@@ -99,8 +99,8 @@ def test_a_target_is_a_status(published: list[Any]) -> None:
     assert image.name == "msgflow: image"
     assert image.level == b"\2"
     assert image.message == (
-        f"{PATH}: latency 61.000 ms, up to 70.000 ms, required p99 < 10 ms: /detector ran 60.000 ms"
-        "; why: the CPU is busy"
+        f"{PATH}: latency 61.000 ms, up to 70.000 ms, required p99 < 10 ms:"
+        " /detector: on_image takes 60 ms"
     )
     assert {each.key: each.value for each in image.values} == {
         "p50": "50.000 ms",
@@ -111,6 +111,12 @@ def test_a_target_is_a_status(published: list[Any]) -> None:
     assert [each.level for each in (scan, imu, odom)] == [b"\0", b"\3", b"\1"]
     assert imu.message == f"{PATH}: latency p99 < 10 ms: silent"
     assert [each.key for each in scan.values] == ["lag"]
+
+
+def test_where_nothing_stands_out_it_says_what_takes_longest() -> None:
+    culprit = {"kind": None, "headline": "nothing stands out", "evidence": ["longest takes Timer"]}
+    line = violation_line(ROW | {"culprit": culprit, "is_final": True})
+    assert line.endswith("required p99 < 10 ms: nothing stands out: longest takes Timer")
 
 
 def test_what_diagnostics_need_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

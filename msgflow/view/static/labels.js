@@ -154,20 +154,26 @@ const TITLES = {
   cure: "what to do",
 };
 
-// Parts of a latency, as path-breakdown names them.
+// Parts of a latency, in the words of msgflow/text/parts.py.
 const PARTS = {
-  network_or_idle: "network, or executor idle",
-  executor_busy: "executor busy with others",
-  undecided: "undecided: network or busy executor",
-  until_arrival: "until the message arrived",
-  run_queue: "woken, waiting for a CPU",
-  take_to_callback: "take to callback",
-  all_threads_busy: "all threads of the executor busy",
-  blocked: "blocked by another callback",
-  unpublished: "waiting for a message not published yet",
-  timer: "waiting for the timer",
-  cache: "in a cache",
-  stored: "stored until the subscription existed",
+  network_or_idle: "on the way",
+  until_arrival: "on the way",
+  undecided: "way or queue",
+  executor_busy: "in the queue",
+  all_threads_busy: "no free thread",
+  blocked: "group is busy",
+  executor: "in the executor",
+  run_queue: "waits for a CPU",
+  request_to_take: "request on its way",
+  response_to_take: "answer on its way",
+  cache: "in the cache",
+  timer: "waits for timer",
+  unpublished: "waits for input",
+  intra: "publish (intra)",
+  rclcpp: "publish (rclcpp)",
+  rcl: "publish (rcl)",
+  rmw: "publish (rmw)",
+  dds: "publish (dds)",
 };
 export const partTitle = (name) => PARTS[name] ?? name.replaceAll("_", " ");
 // Of these colours too light or too dull for the page's own colour as text on them.

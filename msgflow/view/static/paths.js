@@ -361,7 +361,7 @@ export class PathsPage {
       h(
         "p",
         { className: "soft" },
-        "The mean of each part, in the order in which a flow goes through them. Where a message waited for a callback, the trace may not tell whether the network or a busy executor was the reason: that is undecided.",
+        "The mean of each part, in the order in which a flow goes through them. Where a message waited for a callback, the trace may not tell whether it was still on the way or in the queue.",
       ),
       stack,
       legend,

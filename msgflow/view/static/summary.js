@@ -26,12 +26,22 @@ export function summary(table, options = {}) {
   ];
 }
 
-// A sentence for each culprit, the worst first.
+// A block for each culprit, the worst first; the last ones unfold.
+const MOST_CULPRITS = 3;
 export function verdict(table) {
+  const blocks = Array.from({ length: table.rows }, (_, row) =>
+    h(
+      "div",
+      // One that says that nothing stands out is no culprit.
+      { className: table.kind[row] ? "culprit" : "healthy" },
+      h("p", {}, h("b", {}, table.headline[row])),
+      table.evidence[row].map((line) => h("p", {}, line)),
+      table.next[row] && h("p", { className: "command" }, "next: ", h("code", {}, table.next[row])),
+    ));
+  const more = blocks.slice(MOST_CULPRITS);
   return [
-    table.rows
-      ? Array.from(table.sentence, (sentence) => h("p", {}, breakable(sentence)))
-      : h("p", {}, table.meta.when_empty),
+    blocks.length ? blocks.slice(0, MOST_CULPRITS) : h("p", {}, table.meta.when_empty),
+    more.length > 0 && h("details", {}, h("summary", {}, `${more.length} more`), more),
     notes(table.meta.notes),
     command(...table.meta.commands),
   ];

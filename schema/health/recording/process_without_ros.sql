@@ -1,6 +1,7 @@
 -- title: A traced process has no ROS events
 -- description: The trace has events of the process, but no node, publisher, subscription, service,
---     client, timer or callback. What it does with messages is not known.
+--     client, timer or callback. What it does with messages is not known. A process that began to
+--     use ROS and has no node yet is still starting.
 -- cause: It runs with a tracetools that was built without LTTng, or it is not a ROS process.
 -- cure: In its environment, ros2 run tracetools status must say that tracing is enabled; if it does
 --     not, build tracetools with LTTng installed. Start the process with the events of ROS enabled.
@@ -12,7 +13,7 @@ SELECT
     1::BIGINT AS count,
     printf('seen for %.3f s', (last_seen_ns - first_seen_ns) / 1e9) AS detail
 FROM main.process
-WHERE process_id NOT IN (
+WHERE coalesce(tracetools_version, python_version) IS NULL AND process_id NOT IN (
     SELECT process_id FROM main.node
     UNION ALL
     SELECT process_id FROM main.publisher

@@ -11,7 +11,7 @@
 -- column: share DOUBLE [share]  Part of the difference of the path
 -- column: node VARCHAR [node]  Node, or 'between nodes'; NULL: all of the path
 -- column: part VARCHAR  As in `path-breakdown`; of a callback where the kernel was traced 'running'
---     (on a CPU), 'run_queue' (waiting for one) and 'blocked' (asleep); 'all': the path
+--     (on a CPU), 'run_queue' (waiting for one) and 'sleeping'; 'all': the path
 -- column: what VARCHAR  Callback, or topic of the message
 -- column: a_mean_ns BIGINT [ns]  How long it took in run A, per flow
 -- column: b_mean_ns BIGINT [ns]  The same in run B
@@ -27,7 +27,7 @@ WITH state AS (
         SELECT 'b', *
         FROM state_b
     )
-    ON running, run_queue, blocked INTO NAME state VALUE state_ns
+    ON running, run_queue, sleeping INTO NAME state VALUE state_ns
 ),
 spent AS (
     SELECT

@@ -1,6 +1,7 @@
 -- description: What of a comparison (`compared`) is worse on side B than conditions (`condition`)
---     allow. The measured values decide, even if the difference may be chance. The reason is NULL
---     where side A is below 0, as of clocks that are apart: there is no percentage of it.
+--     allow. The measured values decide; whether their difference may be chance is said of each. A
+--     maximum is one value of each side: a condition on it means that. The reason is NULL where
+--     side A is below 0, as of clocks that are apart: there is no percentage of it.
 -- grain: one row per condition and path, callback or topic that exceeds it
 -- reads: compared, condition
 WITH measured AS (
@@ -26,7 +27,7 @@ WITH measured AS (
 ),
 judged AS (
     SELECT
-        place, row_place, text, subject, a_text,
+        place, row_place, text, subject, verdict, a_text,
         CASE
             WHEN is_share AND b_share IS NULL THEN 'has nothing in B that could arrive'
             WHEN is_share THEN format(
@@ -59,6 +60,9 @@ SELECT
     text AS condition,
     subject,
     reason || coalesce(chance, '') AS reason,
-    a_text
+    a_text,
+    chance IS NOT NULL AND verdict IN (
+        'no difference shown', 'too few values', 'too few independent values', 'too few runs'
+    ) AS may_be_chance
 FROM judged
 ORDER BY place, row_place

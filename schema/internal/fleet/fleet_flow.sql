@@ -20,11 +20,16 @@
 -- column: is_first, is_last, is_newest
 -- column: is_loss_affected BOOLEAN  A gap of a trace overlaps its time
 -- column: is_ambiguous
+WITH path_chain AS MATERIALIZED (FROM main.flow_chain($runs)),
+named_path AS MATERIALIZED (
+    SELECT path_id, alike_id, path
+    FROM main.flow_path($runs, only_paths := true, chains := 'path_chain')
+)
 SELECT
     e.run_id, p.path, e.path_id, e.root_kind, e.root_id, e.root_ns, e.take_id, e.sink_event,
     e.sink_ns, e.latency_ns, e.status, e.reason, e.is_first, e.is_last, e.is_newest,
     e.is_loss_affected, e.is_ambiguous
-FROM main.end_to_end($runs) AS e
-JOIN main.flow_path($runs, only_paths := true) AS p ON e.path_id = p.path_id
+FROM main.end_to_end($runs, chains := 'path_chain', paths := 'named_path') AS e
+JOIN named_path AS p ON e.path_id = p.path_id
 ORDER BY
     e.run_id, p.path, e.path_id, e.root_ns, e.root_kind, e.root_id, e.sink_ns, e.take_id

@@ -1,9 +1,10 @@
 -- title: The longest pieces of a slow flow
--- description: Rows of critical-path: the longest pieces of one flow, in their order, and behind
---     them the sum of all others. It has the columns of its input.
+-- description: Rows of critical-path: the longest pieces of one flow, in their order, so many
+--     that no more than a tenth is left, and behind them the sum of all others. It has the columns
+--     of its input.
 -- grain: one row per piece
 -- reads: slow_flow
--- param: count BIGINT = 5  How many pieces
+-- param: count BIGINT = 5  How many pieces, if they are enough
 WITH piece AS (
     SELECT
         *,
@@ -13,8 +14,12 @@ WITH piece AS (
 longest AS (
     SELECT *
     FROM piece
-    QUALIFY row_number() OVER (ORDER BY duration_ns DESC, place) <= $count
-        AND activity IS DISTINCT FROM 'rest'
+    WHERE activity IS DISTINCT FROM 'rest'
+    WINDOW longest AS (ORDER BY duration_ns DESC, place)
+    QUALIFY row_number() OVER longest <= $count
+        OR coalesce(sum(duration_ns) OVER (
+            longest ROWS BETWEEN UNBOUNDED PRECEDING AND 1 PRECEDING
+        ), 0) < 0.9 * latency_ns
 )
 SELECT * EXCLUDE (place)
 FROM (

@@ -1,137 +1,235 @@
--- title: What makes data late, the worst first
--- description: A sentence for each culprit on the paths of an explanation. What is wrong with the
---     recording or the system as a whole comes first, then what delays data, or loses them. If
---     nothing stands out, one row says what takes most of the slowest path.
+-- title: What makes data late, or lets them get lost, the worst first
+-- description: One culprit for each chain of causes: of several that explain the same callback, the
+--     one whose kind is more exact holds. The harm is by how much older the data at the end of the
+--     path are on average, of those that are lost until the next ones. If nothing stands out, one
+--     row says what takes most of the slowest path.
 -- grain: one row per culprit
--- reads: breakdown, path_row, suspect
--- column: who VARCHAR  The culprit: a node, or a thread without ROS; of the recording what a
---     finding is about; NULL: nothing stands out
--- column: kinds VARCHAR[]  What it does, the worst first: 'callback', 'executor', 'cpu',
---     'service', 'queue', 'lost', 'late_start', 'stale' or 'way'; or the name of a finding
--- column: cost_ns BIGINT [ns]  By how much the data at the end of a path are older because of it;
---     half of that where it only may be so; NULL: of findings
--- column: path VARCHAR [path]  Path that it delays most: of equal ones the first by name
--- column: sentence VARCHAR  The sentence
--- column: lacks VARCHAR[]  What was not recorded that would tell whether it is so: 'kernel',
---     'callbacks'
-WITH step AS (
-    SELECT list_distinct(flatten(list(string_split(path, ' → ')))) AS names FROM path_row
-),
--- Of these paths, or of the recording as a whole.
-touching AS (
+-- reads: application_path, breakdown, culprit
+-- column: rank BIGINT  Place, from 1; NULL: nothing stands out
+-- column: kind VARCHAR  What it does: the file of `schema/culprit`; NULL: nothing stands out
+-- column: node VARCHAR  Node; of a kind that concerns two, the one that takes the message, or waits
+-- column: callback VARCHAR  What triggers its callback; NULL: not one callback
+-- column: function VARCHAR  Function of the callback, without its module; NULL: not known
+-- column: other VARCHAR  Who else has to do with it: a server, a publisher, who holds a lock, or a
+--     program
+-- column: other_callback VARCHAR  What triggers the callback of that
+-- column: other_function VARCHAR  Function of that
+-- column: topic_name VARCHAR  Topic whose messages are late or lost
+-- column: path VARCHAR [path]  Path that it delays most
+-- column: harm_ns BIGINT [ns]  Mean time by which the data at the end of the path are older
+-- column: p95_ns BIGINT [ns]  95 % of the messages are delayed by no more at one place
+-- column: lost BIGINT  Messages lost
+-- column: published BIGINT  Of so many
+-- column: headline VARCHAR  Who, what kind, how much of what
+-- column: evidence VARCHAR[]  What shows it: two lines at most
+-- column: lacks VARCHAR  What was not recorded that would tell more: 'kernel' or 'callbacks'
+WITH numbered AS (
     SELECT
-        f.name, f.title, f.subject, f.detail,
-        row_number() OVER (ORDER BY f.severity, f.name, f.subject, f.detail) AS place
-    FROM main.finding AS f
-    LEFT JOIN main.node AS n ON f.node_id = n.node_id
-    LEFT JOIN main.node AS p ON f.publishing_node_id = p.node_id
-    WHERE list_contains($runs, f.run_id)
-        AND f.severity IN ('error', 'warning')
-        -- The verdict has sentences of its own for these, or they delay nothing by themselves.
-        AND f.name NOT IN ('dead_end', 'executor_preempted', 'busy_waiting')
-        AND (
-            coalesce(f.topic_name, n.full_name, p.full_name) IS NULL
-            OR list_has_any(
-                (SELECT names FROM step), [f.topic_name, n.full_name, p.full_name]
-            )
-        )
-),
-found AS (
-    SELECT
-        min(place) AS place,
-        name,
-        arg_min(subject, place) AS subject,
-        printf(
-            '%s — %s: %s', any_value(title), arg_min(subject, place), arg_min(detail, place)
-        )
-        || CASE WHEN count(*) > 1
-            THEN printf('; %d more like this (msgflow check)', count(*) - 1)
-            ELSE '' END AS sentence
-    FROM touching
-    GROUP BY name
-    ORDER BY place
-    LIMIT 3
+        *,
+        row_number() OVER (ORDER BY place, harm_ns DESC, node, callback, path, topic_name) AS number
+    FROM culprit
 ),
 chosen AS (
     SELECT
-        kind, who, what,
-        arg_min(path, (-cost_ns, path)) AS path,
-        max(cost_ns) AS cost_ns,
-        unnest(arg_min({'clause': clause, 'lacks': lacks}, (-cost_ns, path, clause)))
-    FROM (
-        SELECT
-            kind,
-            coalesce(who, '?') AS who,
-            what, path,
-            coalesce(cost_ns, 0) AS cost_ns,
-            lacks,
-            clause || CASE lacks
-                WHEN 'kernel' THEN ' (not known without a kernel trace)'
-                WHEN 'callbacks' THEN ' (not known without its callbacks)'
-                ELSE ''
-            END AS clause
-        FROM suspect
-        WHERE matters AND clause IS NOT NULL
+        *,
+        -- As a reader says them: the function, and what triggers it where there is room.
+        coalesce(function, callback) AS name,
+        coalesce(function || ' (' || callback || ')', callback) AS long_name,
+        coalesce(other_function, other_callback) AS other_name,
+        main.duration_text(run_ns) AS run,
+        main.duration_text(usual_ns) AS usual,
+        CASE
+            WHEN every > 1 THEN printf(', 1 of %d times', every)
+            -- Of so few, 95 % are all.
+            WHEN run_ns > usual_ns AND count < 20 THEN printf(' (longest of %d)', count)
+            WHEN run_ns > usual_ns THEN ' (p95)'
+            ELSE ''
+        END AS at_times,
+        coalesce(topic_name, '?') AS topic
+    FROM numbered AS c
+    WHERE NOT EXISTS (
+        FROM numbered AS o
+        WHERE o.number < c.number AND list_has_any(
+                o.claims,
+                CASE
+                    WHEN c.kind = 'waits' THEN c.claims
+                    ELSE list_filter(c.claims, lambda claim: NOT ends_with(claim, ' waits'))
+                END
+            )
+            -- What is not known is explained by what does at least as much harm.
+            AND (c.kind <> 'waits' OR o.harm_ns >= c.harm_ns)
     )
-    GROUP BY kind, who, what
-    -- What delays less than two others of one culprit would hide the others.
-    QUALIFY kind IN ('queue', 'lost', 'late_start')
-        OR row_number() OVER (
-            PARTITION BY who, kind IN ('queue', 'lost', 'late_start')
-            ORDER BY max(cost_ns) DESC, kind, what
-        ) <= 2
-),
-told AS (
-    SELECT
-        who,
-        list(kind ORDER BY cost_ns DESC, kind, what) AS kinds,
-        max(cost_ns) AS cost_ns,
-        arg_min(path, (-cost_ns, kind, what)) AS path,
-        printf('%s: %s', who, string_agg(clause, '; ' ORDER BY cost_ns DESC, kind, what))
-            AS sentence,
-        coalesce(list(DISTINCT lacks ORDER BY lacks) FILTER (lacks IS NOT NULL), []) AS lacks
-    FROM chosen
-    GROUP BY who
-),
-slowest AS (
-    SELECT path, p95_ns
-    FROM path_row
-    WHERE p95_ns IS NOT NULL
-    ORDER BY p95_ns DESC, path
-    LIMIT 1
 ),
 said AS (
     SELECT
-        place,
-        subject AS who,
-        [name] AS kinds,
-        NULL::BIGINT AS cost_ns,
-        NULL::VARCHAR AS path,
-        sentence,
-        []::VARCHAR[] AS lacks
-    FROM found
-    UNION ALL
+        *,
+        CASE kind
+            WHEN 'action' THEN printf(
+                '%s %s for %s', long_name,
+                CASE WHEN waiting_callback IS NULL THEN 'executes goals'
+                    ELSE 'blocks its executor' END,
+                run
+            )
+            WHEN 'service' THEN CASE WHEN is_awaited IS NULL
+                THEN printf('%s takes %s%s, and data of %s wait', long_name, run, at_times, other)
+            ELSE printf(
+                '%s %s %s for %s%s', name,
+                CASE WHEN is_awaited THEN 'awaits' ELSE 'calls' END, service_name, run, at_times
+            ) || coalesce(printf(' (%s of %s)', other_name, other), '') END
+            WHEN 'overload' THEN printf(
+                'its thread is asked for %.0f %%: %d like %s, %s each %s', 100 * load, count, name,
+                run, main.duration_text(period_ns)
+            )
+            WHEN 'burst' THEN printf(
+                '%s sends up to %d messages on %s at once, each %s',
+                coalesce(long_name, 'it'), count, topic, main.duration_text(period_ns)
+            )
+            WHEN 'computes' THEN printf('%s computes %s%s', long_name, run, at_times)
+            WHEN 'sleeps'
+                THEN printf('%s sleeps %.0f %% of %s%s', long_name, 100 * share, run, at_times)
+            WHEN 'disk' THEN printf('%s waits for the disk, for %s%s', long_name, run, at_times)
+            WHEN 'lock' THEN printf(
+                '%s waits %s for a lock that %s holds', name, run, other_name
+            )
+            WHEN 'no_cpu' THEN printf(
+                '%s has no CPU for %s (p95)%s', coalesce(long_name, 'its thread'),
+                main.duration_text(p95_ns), coalesce(printf(': %s has it', other), '')
+            )
+            WHEN 'stale' THEN printf(
+                '%s %s data%s for up to %s', long_name,
+                CASE WHEN is_supposed THEN 'may keep' ELSE 'keeps' END,
+                coalesce(printf(' of %s', topic_name), ''), main.duration_text(period_ns)
+            )
+            WHEN 'restart' THEN printf('ended, and ran again after %s', run)
+            || coalesce(printf(': %d of %d messages on %s lost', lost, published, topic_name), '')
+            WHEN 'never_matched' THEN printf(
+                'took none of %d messages on %s%s: likely QoS or domain', published, topic,
+                coalesce(printf(' of %s', other), '')
+            )
+            WHEN 'late_start' THEN printf(
+                'started %s after the others, missed %d of %d messages on %s', run, lost,
+                published, topic
+            )
+            WHEN 'lost'
+                THEN printf('%d of %d messages on %s are lost on the way', lost, published, topic)
+            WHEN 'waits' THEN CASE
+                WHEN p95_ns > 0 THEN printf(
+                    'messages on %s wait %s (p95)%s', topic, main.duration_text(p95_ns),
+                    CASE WHEN count IS NULL THEN '' ELSE ' while its executor spins' END
+                )
+                ELSE printf('%d of %d messages on %s are overwritten', lost, published, topic)
+            END
+            WHEN 'callback' THEN printf(
+                '%s takes %s%s', coalesce(long_name, printf('between its input and %s, it', topic)),
+                run, at_times
+            )
+        END AS what,
+        list_filter(
+            [
+                CASE
+                    WHEN kind IN ('restart', 'never_matched', 'late_start') THEN NULL
+                    ELSE printf(
+                        'data on %s are %s older by it on average',
+                        regexp_replace(path, ' → .* → ', ' → … → '), main.duration_text(harm_ns)
+                    )
+                END,
+                array_to_string(
+                    list_filter(
+                        [
+                            CASE WHEN kind IN ('callback', 'computes', 'sleeps', 'disk')
+                                AND every > 1 THEN printf('usually it takes %s', usual) END,
+                            printf(
+                                '%s wakes it',
+                                CASE woken_by
+                                    WHEN 'timer' THEN 'a timer of the kernel'
+                                    WHEN 'thread' THEN 'another thread'
+                                    WHEN 'interrupt' THEN 'a device'
+                                    WHEN 'softirq' THEN 'the network or a device'
+                                END
+                            ),
+                            CASE WHEN load >= 0.9 AND kind <> 'overload'
+                                THEN printf('its thread is asked for %.0f %%', 100 * load) END,
+                            CASE WHEN waiting_callback IS NOT NULL
+                                THEN printf('%s of %s waits for it', waiting_callback, waiting_node)
+                            END,
+                            CASE WHEN lost > 0 AND kind NOT IN (
+                                'restart', 'never_matched', 'late_start', 'lost'
+                            )
+                                THEN printf('%d of %d messages on %s overwritten', lost, published,
+                                    topic) END,
+                            CASE WHEN is_supposed AND kind = 'service'
+                                THEN 'as far as times show: requests are recorded since Kilted' END,
+                            CASE
+                                WHEN lacks = 'callbacks' THEN 'its callbacks are not traced'
+                                WHEN lacks = 'kernel' AND kind = 'waits'
+                                    THEN 'on the way, or its thread has no CPU: not known'
+                                WHEN lacks = 'kernel'
+                                    THEN 'computed, slept or had no CPU: not known'
+                            END
+                        ],
+                        lambda part: part IS NOT NULL
+                    ),
+                    '; '
+                )
+            ],
+            lambda line: line <> ''
+        ) AS evidence
+    FROM chosen
+),
+longest AS (
     SELECT
-        1e6 + row_number() OVER (ORDER BY cost_ns DESC, who),
-        who, kinds, cost_ns, path, sentence, lacks
-    FROM told
-    UNION ALL
-    SELECT
-        1e6, NULL,
-        [],
-        NULL, s.path,
-        printf(
-            'nothing stands out: 95 %% of the data on the slowest path arrive within %s; what takes'
-            || ' longest on it is %s of %s, with up to %s',
-            main.duration_text(s.p95_ns), coalesce(b.what, '?'), coalesce(b.node, '?'),
-            main.duration_text(b.p95_ns)
-        ),
-        []
-    FROM slowest AS s
-    JOIN breakdown AS b ON s.path = b.path
-    WHERE NOT EXISTS (FROM told)
-    QUALIFY row_number() OVER (ORDER BY b.total_ns DESC, b.hop) = 1
+        a.path, a.p95_ns, b.what, b.node,
+        b.p95_ns AS longest_ns
+    FROM application_path AS a
+    JOIN breakdown AS b ON a.path = b.path
+    ORDER BY a.p95_ns DESC, a.path, b.total_ns DESC, b.hop
+    LIMIT 1
 )
-SELECT who, kinds, cost_ns, path, sentence, lacks
+SELECT
+    -- What is known comes before what is not; what a start delays is over soon.
+    row_number() OVER (
+        ORDER BY
+            CASE kind WHEN 'late_start' THEN 2 WHEN 'waits' THEN 1 ELSE 0 END,
+            harm_ns DESC,
+            number
+    ) AS rank,
+    kind, node, callback, function, other, other_callback, other_function, topic_name, path,
+    harm_ns, p95_ns, lost, published,
+    printf(
+        '%s: %s', node,
+        -- What triggers the callback stands there where the line has room for it.
+        CASE
+            WHEN length(node) + length(what) > 98 THEN replace(what, long_name, name)
+            ELSE what
+        END
+    ) AS headline,
+    evidence, lacks
 FROM said
-ORDER BY place
+UNION ALL
+SELECT
+    NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, l.path, NULL, l.p95_ns, NULL, NULL,
+    'nothing stands out',
+    list_filter(
+        [
+            printf(
+                '95 %% of the data on the slowest path arrive within %s',
+                main.duration_text(l.p95_ns)
+            ),
+            CASE
+                WHEN l.node = 'between nodes' THEN printf(
+                    'longest takes the way on %s: %s (p95)', l.what,
+                    main.duration_text(l.longest_ns)
+                )
+                ELSE printf(
+                    'longest takes %s of %s: %s (p95)', l.what, l.node,
+                    main.duration_text(l.longest_ns)
+                )
+            END
+        ],
+        lambda line: line IS NOT NULL
+    ),
+    NULL
+FROM (SELECT 1)
+LEFT JOIN longest AS l ON true
+WHERE NOT EXISTS (FROM said)
+ORDER BY rank

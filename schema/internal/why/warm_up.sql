@@ -7,12 +7,12 @@
 WITH flow AS (
     SELECT
         run_id AS side,
-        path_id AS subject,
+        alike_id AS subject,
         root_ns AS at_ns,
         latency_ns AS value_ns,
-        count(*) OVER (PARTITION BY run_id, path_id) AS number,
+        count(*) OVER (PARTITION BY run_id, alike_id) AS number,
         row_number() OVER (
-            PARTITION BY run_id, path_id ORDER BY root_ns, root_id, latency_ns
+            PARTITION BY run_id, alike_id ORDER BY root_ns, root_id, latency_ns
         ) - 1 AS position
     FROM path_outcome
     WHERE status = 'reached' AND is_first AND latency_ns IS NOT NULL

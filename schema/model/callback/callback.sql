@@ -63,7 +63,12 @@ complete AS (
 SELECT
     c.callback_id, c.process_id,
     coalesce(c.node_id, s.node_id, v.node_id) AS node_id,
-    c.kind, c.subscription_id, c.timer_id, c.service_id, c.callback_handle, c.symbol, c.created_ns,
+    -- In Python the goal is executed there: the request is answered before.
+    CASE
+        WHEN c.kind = 'service' AND ends_with(v.service_name, '/_action/send_goal') THEN 'action'
+        ELSE c.kind
+    END AS kind,
+    c.subscription_id, c.timer_id, c.service_id, c.callback_handle, c.symbol, c.created_ns,
     c.event_id
 FROM complete AS c
 LEFT JOIN staging.subscription AS s ON c.subscription_id = s.subscription_id

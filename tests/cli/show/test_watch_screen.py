@@ -107,13 +107,12 @@ def test_a_violation_stays_on_the_screen() -> None:
         "measured": "182.000 ms",
         "worst_ns": 182 * MS,
         "is_final": False,
-        "culprit": "/detector ran 141.000 ms",
-        "why": None,
+        "culprit": {"kind": "callback", "headline": "/detector: on_image takes 141 ms"},
     }
     screen = new_screen()
     lines(screen, report(violations=[violation]))
     text = " ".join(lines(screen, report()))
-    assert "22:13:30 /cmd: latency 182.000 ms, required max < 80 ms: /detector ran" in text
+    assert "22:13:30 /cmd: latency 182.000 ms, required max < 80 ms: /detector: on_image" in text
     assert "(provisional)" in text
 
 
@@ -160,8 +159,10 @@ VIOLATION = {
     "measured": "182.000 ms",
     "worst_ns": 182 * MS,
     "is_final": False,
-    "culprit": "/filter ran 141.000 ms, /scan was on its way for 40.762 ms",
-    "why": "/filter: its callback Subscription(/scan) takes 139 ms of 180 ms",
+    "culprit": {
+        "kind": "callback",
+        "headline": "/filter: Filter.on_scan (Subscription(/scan)) takes 139 ms, 1 of 9 times",
+    },
 }
 
 

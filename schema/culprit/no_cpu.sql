@@ -1,0 +1,48 @@
+-- title: A thread that waits for a CPU
+-- description: As a kernel trace shows: before its callback, or in it. What has the CPU is named by
+--     program.
+-- grain: one row per node and path
+-- reads: application_path, blame, callback_cpu, callback_use, cpu_user, harm, noticed
+-- next: query scheduling --measure preemption --node {node}
+SELECT
+    5 AS place,
+    w.node,
+    arg_max_null(w.callback, w.mean_ns) AS callback,
+    arg_max_null(u.function, w.mean_ns) AS function,
+    w.path,
+    arg_max_null(w.topic_name, w.mean_ns) AS topic_name,
+    sum(w.mean_ns)::BIGINT AS harm_ns,
+    max(w.p95_ns) AS p95_ns,
+    arg_max_null(w.lost, w.mean_ns) AS lost,
+    arg_max_null(w.published, w.mean_ns) AS published,
+    any_value(p.program) AS other,
+    any_value(p.total_ns) AS other_ns,
+    list(
+        w.node || coalesce(w.callback, w.topic_name, '')
+        || CASE WHEN w.is_run THEN '' ELSE ' cpu' END
+    ) AS claims
+FROM (
+    SELECT
+        waiting_node AS node,
+        waiting_callback AS callback,
+        path, topic_name, mean_ns, p95_ns, lost, published,
+        false AS is_run
+    FROM blame
+    WHERE is_cpu
+    UNION ALL
+    SELECT
+        h.node, h.callback, h.path, h.topic_name,
+        h.harm_ns * (c.waiting_ns / c.run_ns),
+        h.p95_ns, h.lost, h.published, true
+    FROM harm AS h
+    JOIN callback_cpu AS c ON h.node = c.node AND h.callback = c.callback
+    WHERE c.waiting_ns > 0.5 * c.run_ns
+) AS w
+JOIN application_path AS a ON w.path = a.path
+LEFT JOIN callback_use AS u ON w.node = u.node AND w.callback = u.callback
+LEFT JOIN cpu_user AS p ON w.node = p.node
+CROSS JOIN noticed AS l
+GROUP BY w.node, w.path
+HAVING sum(w.mean_ns) >= any_value(l.least_ns)
+    AND max(w.p95_ns) >= min(greatest(l.least_ns, least(l.late_ns, l.of_period * u.period_ns)))
+    AND max(w.p95_ns) >= min(l.of_path * a.p95_ns)

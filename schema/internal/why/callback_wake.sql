@@ -1,0 +1,67 @@
+-- title: What woke the threads of callbacks that slept
+-- description: What ended the sleeps of callbacks that sleep most of the time that they take, and
+--     which callback the thread ran that woke them, or had just run.
+-- grain: one row per node and callback
+-- when: main.thread_state
+-- reads: callback_cpu, callback_name, noticed
+-- column: node VARCHAR  Node of the callback that slept
+-- column: callback VARCHAR  What triggers it
+-- column: kind VARCHAR  What woke it: 'thread', 'timer', 'interrupt' or 'softirq'; NULL: not known
+-- column: sleep_ns BIGINT [ns]  95 % of the sleeps took no longer
+-- column: other_node VARCHAR  Node of the callback that the waking thread ran; NULL: none
+-- column: other_callback VARCHAR  What triggers that
+-- column: other_function VARCHAR  Its function
+-- column: is_same_process BOOLEAN  Both are callbacks of one process
+WITH instance AS (
+    SELECT n.node, n.callback, n.process_id, i.thread_id, i.start_ns, i.end_ns
+    FROM main.callback_instance AS i
+    JOIN callback_name AS n ON i.callback_id = n.callback_id
+    JOIN callback_cpu AS c ON n.node = c.node AND n.callback = c.callback
+    WHERE list_contains($runs, i.run_id)
+        AND c.sleeping_ns > 0.5 * c.run_ns
+        AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
+),
+slept AS (
+    SELECT
+        i.node, i.callback, i.process_id, s.waker_kind, s.waker_thread_id, s.end_ns,
+        s.end_ns - s.start_ns AS sleep_ns
+    FROM main.thread_state AS s
+    ASOF JOIN instance AS i ON s.thread_id = i.thread_id AND s.start_ns >= i.start_ns
+    WHERE list_contains($runs, s.run_id) AND s.state = 'sleeping' AND s.start_ns < i.end_ns
+),
+woken AS (
+    SELECT
+        s.node, s.callback, s.sleep_ns, s.waker_kind,
+        o.node AS other_node,
+        o.callback AS other_callback,
+        o.function AS other_function,
+        s.process_id = o.process_id AS is_same_process
+    FROM slept AS s
+    CROSS JOIN noticed AS n
+    ASOF LEFT JOIN (
+        SELECT thread_id, start_ns, end_ns, callback_id
+        FROM main.callback_instance
+        WHERE list_contains($runs, run_id)
+    ) AS j
+        ON s.waker_thread_id = j.thread_id AND s.end_ns >= j.start_ns
+    LEFT JOIN callback_name AS o
+        ON j.callback_id = o.callback_id AND s.end_ns <= j.end_ns + n.least_ns
+)
+SELECT
+    node, callback,
+    arg_max_null(waker_kind, total_ns) AS kind,
+    arg_max(p95_ns, total_ns) AS sleep_ns,
+    arg_max_null(other_node, total_ns) AS other_node,
+    arg_max_null(other_callback, total_ns) AS other_callback,
+    arg_max_null(other_function, total_ns) AS other_function,
+    arg_max_null(is_same_process, total_ns) AS is_same_process
+FROM (
+    SELECT
+        node, callback, waker_kind, other_node, other_callback, other_function, is_same_process,
+        sum(sleep_ns) AS total_ns,
+        quantile_disc(sleep_ns, 0.95) AS p95_ns
+    FROM woken
+    GROUP BY
+        node, callback, waker_kind, other_node, other_callback, other_function, is_same_process
+)
+GROUP BY node, callback
