@@ -81,6 +81,11 @@ def _shown(found: Explanation) -> dict[str, QueryResult]:
     shown = {}
     for name, (title, columns) in _SHOWN.items():
         result = found.sections[name]
+        # Of how many equal ones a row is the sum: as a rule, of one.
+        if name == "slow_flow" and not any(
+            row["pieces"] > 1 for row in result.to_arrow().to_pylist() if row["activity"] != "rest"
+        ):
+            columns = columns.replace(" pieces", "")
         title = title.format(place)
         rows = result.first(_PATHS) if name == "paths" else result
         shown[title] = rows.with_columns(columns.split())
