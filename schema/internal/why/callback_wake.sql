@@ -61,6 +61,8 @@ FROM (
         sum(sleep_ns) AS total_ns,
         quantile_disc(sleep_ns, 0.95) AS p95_ns
     FROM woken
+    -- Some wakings may be missing in the trace.
+    WHERE waker_kind IS NOT NULL
     GROUP BY
         node, callback, waker_kind, other_node, other_callback, other_function, is_same_process
 )
