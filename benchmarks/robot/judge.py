@@ -58,7 +58,7 @@ class Culprit:
         function: the last name of its symbol; None: likewise.
         names: what headline and evidence have to name besides.
         sufferer: whom it has to name instead, with a number, where nothing but a trace of the
-            kernel tells the kind; None: it is told without one.
+            kernel tells the kind; None: `why` knows it without one.
     """
 
     kinds: tuple[Kind, ...]

@@ -12,24 +12,28 @@ from msgflow.text.wrapping import hanging, wrap
 if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
 
-_CULPRITS = 3
-
 
 def culprit_lines(
-    verdict: QueryResult, command_of: Callable[[Sequence[str]], str], width: int
+    verdict: QueryResult,
+    command_of: Callable[[Sequence[str]], str],
+    width: int,
+    *,
+    whole: str = "--wide",
 ) -> Iterator[str]:
     """Yield a block for each of the worst culprits, and an empty line behind each.
 
-    `command_of` returns what the shell runs, of words behind `msgflow`.
+    `command_of` returns what the shell runs, of words behind `msgflow`; `whole` shows all of them.
     """
+    from msgflow.query.why import MOST_CULPRITS
+
     rows = verdict.table.to_pylist()
-    for row in rows[:_CULPRITS]:
+    for row in rows[:MOST_CULPRITS]:
         yield from wrap(printable(row["headline"]), width)
         for line in row["evidence"]:
             yield from hanging("  ", printable(line), width)
         if row["next"] is not None:
             yield f"  next: {printable(command_of(shlex.split(row['next'])))}"
         yield ""
-    if (more := len(rows) - _CULPRITS) > 0:
-        yield f"{more} more (--wide)"
+    if (more := len(rows) - MOST_CULPRITS) > 0:
+        yield f"{more} more ({whole})"
         yield ""

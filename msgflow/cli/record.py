@@ -139,7 +139,8 @@ def command(
             with suppress(NoFlowError):
                 verdict = opened.why(run=name).verdict
                 command_of = partial(_command, database)
-                print_lines(culprit_lines(verdict, command_of, screen_width()))
+                whole = command_of(["why", "--wide"])
+                print_lines(culprit_lines(verdict, command_of, screen_width(), whole=whole))
             latencies = opened.query("e2e-latency", run=name)
             print_result(latencies)
             for sentence in part_of_latencies(opened, latencies):

@@ -93,8 +93,9 @@ def _shown(found: Explanation) -> dict[str, QueryResult]:
 
 
 def _command(step: Sequence[str], part: SliceWords, database: Path) -> str:
-    # Of a flow the identity tells the run; suggestions are from all of a run.
-    taken = {"query": part, "suggest": {"run": part.get("run")}}.get(step[0], {})
+    # Of a flow the identity tells the run; suggestions and findings are from all of a run.
+    whole: SliceWords = {"run": part.get("run")}
+    taken = {"query": part, "suggest": whole, "check": whole}.get(step[0], {})
     words = ["msgflow", *step]
     for name, value in taken.items():
         if value is not None:

@@ -41,6 +41,8 @@ _RECORDED_BY = {
     "kernel": "msgflow record --kernel shows what had the CPU",
     "callbacks": "msgflow record -- COMMAND traces callbacks of Python nodes",
 }
+MOST_CULPRITS = 3
+"""So many of the worst culprits are shown; the others are counted."""
 # What a path has in place of a topic without a name.
 _UNNAMED = "?"
 
@@ -126,10 +128,10 @@ class _Questions:
             for kind in culprit_sql().names():
                 self.keep(culprit_sql().header(kind).reads, values)
             self.steps.unite("culprit", culprit_sql(), values)
-            verdict = _with_next(
-                internal_sql().run(self.connection, "verdict", values).to_arrow_table()
-            )
+            verdict = internal_sql().run(self.connection, "verdict", values).to_arrow_table()
             paths = self.rows("worst_first", paths, values | {"path": _worst(verdict)})
+        since = ["--start", str(times.start)] if times != asked else []
+        verdict = _with_next(verdict, since)
         values["path"] = path = paths.table["path"][0].as_py()
         values["paths"] = paths.table["path"].to_pylist()
         doubts = self.rows("doubt", paths, values)
@@ -140,7 +142,6 @@ class _Questions:
         with registered(self.connection, piece=flow.table):
             names = ("piece_to_ask", "callback_function")
             pieces, functions = (self.internal(name, values) for name in names)
-        since = ["--start", str(times.start)] if times != asked else []
         shown: list[tuple[Header, Sequence[Mapping[str, Any]], Sequence[str]]] = [
             (
                 health_sql().header("topic_unnamed"),
@@ -261,15 +262,19 @@ def _worst(verdict: pa.Table) -> str | None:
     return next(filter(None, verdict["path"].to_pylist()), None)
 
 
-def _with_next(verdict: pa.Table) -> pa.Table:
-    """Return culprits with the words behind `msgflow` of the command that shows more of each."""
+def _with_next(verdict: pa.Table, since: Sequence[str]) -> pa.Table:
+    """Return culprits with the words behind `msgflow` of the command that shows more of each.
+
+    `since` leaves a warm-up out; what is lost meanwhile is lost.
+    """
     from msgflow.trace.numpy_arrow import texts_to_arrow
 
-    words = [
-        culprit_sql().header(row["kind"]).next_command(row) if row["kind"] else None
-        for row in verdict.to_pylist()
-    ]
-    lines = [None if one is None else shlex.join(one) for one in words]
+    lines = []
+    for row in verdict.to_pylist():
+        words = culprit_sql().header(row["kind"]).next_command(row) if row["kind"] else None
+        if words and words[0] == "query" and not {"delivery", "unmatched"}.intersection(words):
+            words = (*words, *since)
+        lines.append(shlex.join(words) if words else None)
     return verdict.append_column("next", texts_to_arrow(lines))
 
 

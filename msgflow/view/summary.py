@@ -21,7 +21,7 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.compare import Comparison
 from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection
-from msgflow.query.why import explain
+from msgflow.query.why import MOST_CULPRITS, explain
 from msgflow.result.query_result import QueryResult
 from msgflow.result.rows import cells
 from msgflow.run.choice import Run
@@ -40,8 +40,6 @@ MOST_PATHS = 3
 _MOST_ROWS = 5
 # Places of each kind of finding in Markdown; `msgflow check` lists all of them.
 _MOST_PLACES = 3
-# Culprits in Markdown, as on the screen; `msgflow why --wide` lists all of them.
-_MOST_CULPRITS = 3
 _QUERIES = {
     "paths": ("e2e-latency", Selection(where="pairs > 0", sort=("max_ns:desc",), limit=MOST_PATHS)),
     "drops": (
@@ -282,14 +280,14 @@ def _table(section: Section) -> Iterator[str]:
 def _culprits(section: Section) -> Iterator[str]:
     """Yield a headline for each culprit, and below it what shows it, and what shows more."""
     rows = section.result.table.to_pylist()
-    for row in rows[:_MOST_CULPRITS]:
+    for row in rows[:MOST_CULPRITS]:
         yield f"- **{code(row['headline'])}**"
         for line in row["evidence"]:
             yield f"  - {code(line)}"
         if row["next"] is not None:
             yield f"  - next: {code(row['next'])}"
-    if len(rows) > _MOST_CULPRITS:
-        yield f"- and {len(rows) - _MOST_CULPRITS} more"
+    if len(rows) > MOST_CULPRITS:
+        yield f"- and {len(rows) - MOST_CULPRITS} more"
     yield ""
     for note in section.result.notes:
         yield from (f"note: {code(note)}", "")

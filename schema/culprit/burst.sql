@@ -9,7 +9,6 @@ SELECT
     h.published,
     b.size AS count,
     b.period_ns,
-    b.span_ns AS run_ns,
     h.node AS waiting_node,
     h.callback AS waiting_callback,
     [h.node || h.callback, h.node || ' waits'] AS claims

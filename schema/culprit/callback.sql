@@ -6,10 +6,8 @@
 -- next: query callbacks --each --slowest 5 --node {node}
 SELECT
     9 AS place,
-    node, callback, function, path, topic_name, harm_ns, p95_ns, lost, published, run_ns, usual_ns,
-    every, count, period_ns, load, waiting_node, waiting_callback,
-    CASE WHEN measured_ns IS NULL THEN 'kernel' END AS lacks,
-    claims || [node || ' waits', coalesce(waiting_node, node) || ' waits'] AS claims
+    *,
+    CASE WHEN measured_ns IS NULL THEN 'kernel' END AS lacks
 FROM long_callback
 UNION ALL BY NAME
 -- Where no callbacks are traced: from a take to what the node publishes next.

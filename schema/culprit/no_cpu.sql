@@ -16,7 +16,6 @@ SELECT
     arg_max_null(w.lost, w.mean_ns) AS lost,
     arg_max_null(w.published, w.mean_ns) AS published,
     any_value(p.program) AS other,
-    any_value(p.total_ns) AS other_ns,
     list(
         w.node || coalesce(w.callback, w.topic_name, '')
         || CASE WHEN w.is_run THEN '' ELSE ' cpu' END
@@ -44,5 +43,4 @@ LEFT JOIN cpu_user AS p ON w.node = p.node
 CROSS JOIN noticed AS l
 GROUP BY w.node, w.path
 HAVING sum(w.mean_ns) >= any_value(l.least_ns)
-    AND max(w.p95_ns) >= min(greatest(l.least_ns, least(l.late_ns, l.of_period * u.period_ns)))
-    AND max(w.p95_ns) >= min(l.of_path * a.p95_ns)
+    AND max(w.p95_ns) >= min(greatest(coalesce(u.limit_ns, l.late_ns), l.of_path * a.p95_ns))

@@ -12,7 +12,6 @@ SELECT
     q.server AS other,
     q.server_callback AS other_callback,
     q.server_function AS other_function,
-    q.served_ns AS other_ns,
     q.service_name, q.is_awaited,
     NOT q.is_recorded AS is_supposed,
     [h.node || h.callback, q.server || q.server_callback, h.node || ' waits'] AS claims
@@ -23,12 +22,11 @@ UNION ALL BY NAME
 -- Its response leads on in a callback of its own: no callback waits meanwhile.
 SELECT
     2 AS place,
-    c.* EXCLUDE (claims),
+    c.*,
     string_split(c.path, ' → ')[
         list_position(string_split(c.path, ' → '), printf('(%s)', s.service_name)) - 1
     ] AS other,
-    s.service_name,
-    c.claims || [c.node || ' waits'] AS claims
+    s.service_name
 FROM long_callback AS c
 JOIN (
     SELECT DISTINCT

@@ -41,10 +41,7 @@ WHERE b.node IS NULL AND NOT b.is_cpu AND b.waiting_node IS NOT NULL
             AND k.waiting_node = b.waiting_node
     )
     AND (
-        (
-            b.p95_ns >= greatest(l.least_ns, least(l.late_ns, l.of_period * u.period_ns))
-            AND b.p95_ns >= l.of_path * a.p95_ns
-        )
+        b.p95_ns >= greatest(coalesce(u.limit_ns, l.late_ns), l.of_path * a.p95_ns)
         OR (b.lost >= l.lost AND b.lost >= l.of_messages * b.published)
     )
 QUALIFY row_number() OVER (

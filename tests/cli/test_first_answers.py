@@ -47,7 +47,8 @@ def section(text: str, title: str) -> str:
 @pytest.mark.parametrize("name", few(["real_py_mixed", "real_overload"], "real_overload"))
 def test_the_way_of_a_message_is_the_work_of_no_node(ask: Msgflow, name: str) -> None:
     """All commands say so of the time in which the reader was not busy."""
-    found = json.loads(ask(name, "why", "--format", "json").stdout)
+    # With the warm-up, as the queries.
+    found = json.loads(ask(name, "why", "--start", "0s", "--format", "json").stdout)
     parts = json.loads(ask(name, "query", "path-breakdown", "--format", "json").stdout)
     words = ("query", "critical-path", "--slowest", "5", "--detail", "full", "--format", "json")
     pieces: Rows = json.loads(ask(name, *words).stdout)
@@ -73,11 +74,13 @@ def test_the_way_of_a_message_is_the_work_of_no_node(ask: Msgflow, name: str) ->
 )
 def test_why_keeps_its_columns(ask: Msgflow, name: str, columns: int) -> None:
     shown = ask(name, "why", columns=columns).stdout
-    titles = shown.partition("TIME BY NODE, ON ")[2].splitlines()[1].split()
-    assert titles == ["node", "share", "part", "what", "median", "max"]
     title = "ONE OF ITS SLOW FLOWS (95 OF 100 TAKE NO LONGER)"
     titles = section(shown, title).splitlines()[1].split()
-    assert titles == ["duration", "share", "activity", "node", "what"]
+    # Only rows that stand for several pieces say of how many.
+    assert titles in (
+        ["duration", "share", "activity", "node", "what"],
+        ["duration", "share", "pieces", "activity", "node", "what"],
+    )
     assert "── 1 ──" not in shown
     if name == "real_overload":
         paths = section(shown, "PATHS")

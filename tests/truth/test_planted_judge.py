@@ -99,7 +99,7 @@ def test_nothing_stands_out_of_a_healthy_robot() -> None:
     assert len(list(missed([], [], has_kernel=True))) == 1
 
 
-def test_a_row_without_harm_accuses_nobody() -> None:
+def test_a_row_without_harm_is_a_note() -> None:
     row = {
         "rank": 1,
         "kind": "lock",
@@ -128,8 +128,8 @@ def test_every_planted_problem_has_a_culprit() -> None:
 
 def test_a_seed_changes_names_and_durations_of_a_twin() -> None:
     for robot, seed in product(PROBLEMS, range(1, 11)):
-        healthy, nobody = twin(robot, None, seed)
-        assert nobody == []
+        healthy, culprits = twin(robot, None, seed)
+        assert culprits == []
         for problem in PROBLEMS[robot]:
             planted, culprits = twin(robot, problem, seed)
             assert len(culprits) == 1

@@ -76,8 +76,10 @@ FROM (
         row_number() OVER (),
         printf(
             '%s: %s%s', change, headline,
-            CASE WHEN change IN ('more', 'less')
-                THEN printf(
+            CASE
+                -- Of a pause or of what never came, no age is measured.
+                WHEN kind IN ('late_start', 'never_matched', 'restart') THEN ''
+                WHEN change IN ('more', 'less') THEN printf(
                     ' (data %s older, before %s)', main.duration_text(b_harm_ns),
                     main.duration_text(a_harm_ns)
                 )

@@ -109,7 +109,6 @@ missed AS (
         path, node, callback, topic_name, lost, published,
         greatest(
             0,
-            0,
             older_ns * lost / sum(lost) OVER (PARTITION BY path),
             CASE
                 WHEN NOT is_newest

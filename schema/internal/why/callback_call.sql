@@ -15,9 +15,8 @@
 -- column: usual_ns BIGINT [ns]  Median time of a call
 -- column: p95_ns BIGINT [ns]  Median time of the calls that take three times as long, else 95 %
 --     take no longer
--- column: every BIGINT  One of so many calls is so long; NULL: none stands out
--- column: served_ns BIGINT [ns]  The longest median time in which it answers; NULL: not known
--- column: share DOUBLE  Share of the calls in the time that the callback takes, 0 to 1
+-- column: every BIGINT  One of so many calls is so long; NULL: all are alike
+-- column: share DOUBLE  Share of all calls in the time that the callback takes, 0 to 1
 -- column: is_awaited BOOLEAN  A coroutine awaits it
 -- column: is_recorded BOOLEAN  Requests show it; else that its callback ran within this one
 WITH within AS (
@@ -51,14 +50,14 @@ call AS MATERIALIZED (
     SELECT
         w.callback_instance_id, w.service_name, w.server, w.server_instance_id,
         w.returned_ns - w.sent_ns AS call_ns,
-        w.served_ns, w.is_awaited,
+        w.is_awaited,
         true AS is_recorded
     FROM main.waited_call AS w
     WHERE $has_calls AND list_contains($runs, w.run_id)
     UNION ALL
     SELECT
-        w.callback_instance_id, w.service_name, NULL, w.server_instance_id, w.call_ns, w.call_ns,
-        false, false
+        w.callback_instance_id, w.service_name, NULL, w.server_instance_id, w.call_ns, false,
+        false
     FROM within AS w
     JOIN ran_at_all AS a ON w.service_id = a.service_id
     QUALIFY count(DISTINCT w.server_instance_id) OVER (PARTITION BY w.service_id)
@@ -66,7 +65,7 @@ call AS MATERIALIZED (
 ),
 named AS (
     SELECT
-        n.node, n.callback, c.service_name, c.call_ns, c.served_ns, c.is_awaited, c.is_recorded,
+        n.node, n.callback, c.service_name, c.call_ns, c.is_awaited, c.is_recorded,
         coalesce(s.node, c.server, 'a server that is not recorded') AS server,
         s.callback AS server_callback,
         s.function AS server_function,
@@ -94,9 +93,7 @@ measured AS (
         sum(call_ns) FILTER (WHERE is_awaited) AS awaited_ns,
         quantile_disc(call_ns, 0.95) AS p95_ns,
         count(*) FILTER (WHERE call_ns > 3 * usual_ns) AS long_calls,
-        quantile_disc(call_ns, 0.5) FILTER (WHERE call_ns > 3 * usual_ns) AS long_ns,
-        quantile_disc(served_ns, 0.5) FILTER (WHERE call_ns > 3 * usual_ns) AS long_served_ns,
-        quantile_disc(served_ns, 0.5) AS served_ns
+        quantile_disc(call_ns, 0.5) FILTER (WHERE call_ns > 3 * usual_ns) AS long_ns
     FROM named
     GROUP BY node, callback, service_name
 )
@@ -105,7 +102,6 @@ SELECT
     m.usual_ns,
     CASE WHEN m.long_calls >= 3 THEN m.long_ns ELSE m.p95_ns END AS p95_ns,
     CASE WHEN m.long_calls >= 3 THEN round(m.calls / m.long_calls)::BIGINT END AS every,
-    CASE WHEN m.long_calls >= 3 THEN m.long_served_ns ELSE m.served_ns END AS served_ns,
     sum(m.total_ns) OVER (PARTITION BY m.node, m.callback)
     / greatest(u.mean_ns * u.instances + coalesce(m.awaited_ns, 0), 1) AS share,
     m.is_awaited, m.is_recorded

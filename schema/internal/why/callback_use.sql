@@ -1,28 +1,26 @@
 -- title: What callbacks take of their threads
 -- description: How long callbacks run and how often. Those of one node that the same thing triggers
---     are one, also if the node was started again. The
---     steps of a coroutine are one instance, without the time for which it awaits.
+--     are one, also if the node was started again. The steps of a coroutine are one instance,
+--     without the time for which it awaits.
 -- grain: one row per node and callback
--- reads: callback_name
+-- reads: callback_name, noticed
 -- column: node VARCHAR  Node
 -- column: callback VARCHAR  What triggers it
 -- column: function VARCHAR  Its function, without its module; NULL: not known
--- column: process_id BIGINT  A process that runs it
 -- column: first_ns BIGINT [epoch ns]  When it ran first
 -- column: last_ns BIGINT [epoch ns]  When it ran last
 -- column: instances BIGINT  How often it ran
 -- column: usual_ns BIGINT [ns]  Median duration
 -- column: mean_ns
 -- column: run_ns BIGINT [ns]  95 % of its instances took no longer
--- column: max_ns
 -- column: long_instances BIGINT  Those that took much longer than usual; NULL: none
 -- column: long_ns BIGINT [ns]  How long these take: half of their time goes to longer ones
 -- column: period_ns BIGINT [ns]  Mean time from one start to the next; NULL: it ran once
+-- column: limit_ns BIGINT [ns]  Delay of it that an engineer notices
 WITH instance AS (
     SELECT
         n.node, n.callback,
         any_value(n.function) AS function,
-        any_value(n.process_id) AS process_id,
         min(i.start_ns) AS start_ns,
         sum(i.end_ns - i.start_ns)::BIGINT AS run_ns
     FROM main.callback_instance AS i
@@ -36,13 +34,11 @@ callback AS (
     SELECT
         node, callback,
         any_value(function) AS function,
-        any_value(process_id) AS process_id,
         min(start_ns) AS first_ns,
         max(start_ns) AS last_ns,
         count(*) AS instances,
         quantile_disc(run_ns, [0.5, 0.95]) AS quantiles,
-        avg(run_ns)::BIGINT AS mean_ns,
-        max(run_ns) AS max_ns
+        avg(run_ns)::BIGINT AS mean_ns
     FROM instance
     GROUP BY node, callback
 ),
@@ -66,14 +62,15 @@ longest AS (
     HAVING count(*) >= 3
 )
 SELECT
-    c.node, c.callback, c.function, c.process_id, c.first_ns, c.last_ns, c.instances,
+    c.node, c.callback, c.function, c.first_ns, c.last_ns, c.instances,
     c.quantiles[1] AS usual_ns,
     c.mean_ns,
     c.quantiles[2] AS run_ns,
-    c.max_ns,
     l.long_instances, l.long_ns,
-    (c.last_ns - c.first_ns) // nullif(c.instances - 1, 0) AS period_ns
+    (c.last_ns - c.first_ns) // nullif(c.instances - 1, 0) AS period_ns,
+    greatest(n.least_ns, least(n.late_ns, n.of_period * period_ns))::BIGINT AS limit_ns
 FROM callback AS c
+CROSS JOIN noticed AS n
 LEFT JOIN (
     SELECT
         i.node, i.callback,

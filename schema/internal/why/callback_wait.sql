@@ -12,7 +12,6 @@
 -- column: other_callback VARCHAR  What triggers it; NULL: not known
 -- column: is_cpu BOOLEAN  Its thread was ready, and had no CPU
 -- column: share DOUBLE  Share of all the time that the callback waits, 0 to 1
--- column: mean_ns BIGINT [ns]  Mean over all instances of the callback that waits
 -- column: p95_ns BIGINT [ns]  95 % of its instances waited no longer for this
 WITH wait AS MATERIALIZED (
     SELECT
@@ -175,7 +174,6 @@ piece AS (
 SELECT
     p.node, p.callback, p.other_node, p.other_callback, p.is_cpu,
     sum(p.overlap_ns) / nullif(any_value(w.wait_ns), 0) AS share,
-    (sum(p.overlap_ns) / any_value(w.instances))::BIGINT AS mean_ns,
     -- All others waited 0 for it.
     coalesce(
         list_sort(list(p.overlap_ns), 'DESC')[1 + any_value(w.instances) // 20], 0

@@ -6,7 +6,6 @@
 -- column: node VARCHAR  Node whose thread waited
 -- column: program VARCHAR  Name of what had the CPU longest, and its pid or thread, or how many
 --     threads of that name it were
--- column: total_ns BIGINT [ns]  For how long it had it
 WITH waited AS (
     SELECT DISTINCT l.node, i.thread_id
     FROM main.callback_instance AS i
@@ -35,8 +34,7 @@ SELECT
         '%s (%s)', name,
         CASE WHEN count(DISTINCT number) > 1 THEN printf('%d threads', count(DISTINCT number))
             ELSE any_value(number)::VARCHAR END
-    ) AS program,
-    sum(length_ns)::BIGINT AS total_ns
+    ) AS program
 FROM taken
 GROUP BY node, name
 QUALIFY row_number() OVER (PARTITION BY node ORDER BY sum(length_ns) DESC, name) = 1

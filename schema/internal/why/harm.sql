@@ -24,9 +24,7 @@ WITH judged AS (
         b.*, l.least_ns,
         b.waiting_node IS NULL AS is_direct,
         b.waiting_node = b.node AND b.waiting_callback = b.callback AS is_own,
-        greatest(
-            l.least_ns, least(l.late_ns, l.of_period * u.period_ns), l.of_path * a.p95_ns
-        ) AS limit_ns,
+        greatest(coalesce(u.limit_ns, l.late_ns), l.of_path * a.p95_ns) AS limit_ns,
         b.lost >= l.lost AND b.lost >= l.of_messages * b.published AS is_losing
     FROM blame AS b
     JOIN application_path AS a ON b.path = a.path

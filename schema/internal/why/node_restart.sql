@@ -4,9 +4,8 @@
 -- grain: one row per node, of several times the longest
 -- param: asked_ns BIGINT  Begin of what was asked for: with the warm-up, which start_ns leaves out
 -- column: node VARCHAR  Node
--- column: ended_ns BIGINT [epoch ns]  The last event of its process
--- column: begun_ns BIGINT [epoch ns]  When its next callback ran, else when it was created
--- column: gap_ns BIGINT [ns]  Between the two
+-- column: gap_ns BIGINT [ns]  From the last event of its process until its next callback ran, or
+--     else until it was created again
 -- column: topic_name VARCHAR  The topic that it missed most on; NULL: it misses none
 -- column: lost BIGINT  Messages on that topic meanwhile
 -- column: published BIGINT  All messages on it
@@ -49,7 +48,7 @@ missed AS (
     HAVING count(*) FILTER (WHERE b.start_ns BETWEEN g.ended_ns AND g.begun_ns) > 0
 )
 SELECT
-    g.node, g.ended_ns, g.begun_ns,
+    g.node,
     g.begun_ns - g.ended_ns AS gap_ns,
     m.topic_name, m.lost, m.published
 FROM gap AS g

@@ -6,7 +6,7 @@
 -- column: executor_id BIGINT  The executor
 -- column: node VARCHAR  Node of the callback
 -- column: callback VARCHAR  What triggers it
--- column: demand DOUBLE  Share of one thread that it needs
+-- column: demand DOUBLE  Share of one thread that it needs; of several objects, each
 -- column: load DOUBLE  Share that all callbacks need, of all threads
 -- column: largest DOUBLE  The largest one of a callback, of all threads
 -- column: alike BIGINT  Callbacks that need at least half of the largest
@@ -31,7 +31,8 @@ asked AS (
                 / nullif(u.last_ns - u.first_ns, 0)
             ),
             0
-        ) AS demand
+        ) AS demand,
+        count(DISTINCT m.callback_id) AS callbacks
     FROM member AS m
     JOIN callback_name AS n ON m.callback_id = n.callback_id
     JOIN callback_use AS u ON n.node = u.node AND n.callback = u.callback
@@ -41,14 +42,17 @@ asked AS (
     GROUP BY m.executor_id, n.node, n.callback
 )
 SELECT
-    a.executor_id, a.node, a.callback, a.demand,
+    a.executor_id, a.node, a.callback,
+    a.each_demand AS demand,
     sum(a.demand) OVER each / s.threads AS load,
     a.largest_demand / s.threads AS largest,
-    count(*) FILTER (WHERE 2 * a.demand >= a.largest_demand) OVER each AS alike
+    (sum(a.callbacks) FILTER (WHERE 2 * a.each_demand >= a.largest_demand) OVER each)::BIGINT
+    AS alike
 FROM (
     SELECT
         *,
-        max(demand) OVER (PARTITION BY executor_id) AS largest_demand
+        demand / callbacks AS each_demand,
+        max(demand / callbacks) OVER (PARTITION BY executor_id) AS largest_demand
     FROM asked
 ) AS a
 JOIN (

@@ -7,7 +7,6 @@
 -- column: callback VARCHAR  What triggers the callback that publishes; NULL: none is known
 -- column: function VARCHAR  Its function
 -- column: size BIGINT  Messages of the largest burst
--- column: span_ns BIGINT [ns]  Within which it came
 -- column: period_ns BIGINT [ns]  Median time from one burst to the next
 WITH message AS (
     SELECT
@@ -28,7 +27,6 @@ burst AS (
     SELECT
         topic_name, publisher_id, number,
         min(start_ns) AS start_ns,
-        max(start_ns) - min(start_ns) AS span_ns,
         count(*) AS size,
         min(publication_id) AS publication_id
     FROM (
@@ -52,7 +50,6 @@ topic AS (
         topic_name,
         arg_max(publisher_id, size) AS publisher_id,
         max(size) AS size,
-        arg_max(span_ns, size) AS span_ns,
         arg_max(publication_id, size) AS publication_id,
         quantile_disc(period_ns, 0.5)::BIGINT AS period_ns
     FROM following
@@ -62,7 +59,7 @@ topic AS (
 SELECT
     t.topic_name,
     main.node_label(n.full_name, r.name, r.pid) AS node,
-    k.callback, k.function, t.size, t.span_ns, t.period_ns
+    k.callback, k.function, t.size, t.period_ns
 FROM topic AS t
 JOIN main.publisher AS p ON t.publisher_id = p.publisher_id
 JOIN main.process AS r ON p.process_id = r.process_id
