@@ -1,16 +1,20 @@
 """What tracing costs a robot of Python nodes: latency, CPU, nanoseconds and bytes per event.
 
-    python benchmarks/overhead.py --python PYTHON [--rounds 20] [--messages 50] [--rate 10]
-        [--work 0.05] [--seed 0]
+    python benchmarks/overhead.py --python PYTHON [--rounds 20] [--messages 50] [--hops 5]
+        [--rate 10] [--work 0.05] [--seed 0]
+
+First an event of C alone: with a session, with one that reads the clock of the thread beside it,
+and that in a process that may not. Then a robot.
 
 Five messages lead from a source over four nodes to a sink, each node in a process of its own; each
 but the source waits for 50 ms before it sends its message on. The first one's time is in all of
 them: the sink knows the latency without a trace. In each round, messages go at 10 Hz with nothing
-recorded, with LTTng, with LTTng and the tracer of Python nodes (`msgflow record`), with that tracer
-and nothing recorded, with samples of functions at 99 Hz where perf may, and with the kernel where
-LTTng can trace it; in an order that is drawn. Nodes with the tracer are others than those without;
-both run all the time. CPU time is that of the nodes: with samples it has their interrupts, and not
-what perf itself takes to write them.
+recorded, with LTTng, with LTTng and the tracer of Python nodes, with these and the clocks of
+threads (`msgflow record`), with that tracer and nothing recorded, with samples of functions at 99
+Hz where perf may, and with the kernel where LTTng can trace it; in an order that is drawn. Nodes
+with the tracer are others than those without; both run all the time. CPU time is that of the nodes:
+with samples it has their interrupts, and not what perf itself takes to write them.
+`--hops 9 --rate 100 --work 0` are ten nodes with 1,000 callbacks per second.
 
 Differences are to nothing recorded; intervals hold 95 % of what drawing rounds anew gives. PYTHON
 has the wheels of ROS 2 (`make ros`).
@@ -23,6 +27,7 @@ import contextlib
 import random
 import statistics
 import subprocess
+import sys
 import tempfile
 import time
 from collections import defaultdict
@@ -34,7 +39,7 @@ from recording.recorder import one_at_a_time, require, ros_environment
 from recording.tracetools import build_tracetools
 
 from msgflow import trace
-from msgflow.record import perf
+from msgflow.record import cpu_time, perf
 from msgflow.record.daemon import session_daemon
 from msgflow.record.perf import Rate, recorded_samples
 from msgflow.record.program import PYTHON_NODES
@@ -42,10 +47,29 @@ from msgflow.record.recording import recorded_bytes
 from msgflow.record.session import Channel, can_trace_kernel, recording_session
 
 _CHAIN = Path(__file__).parent / "recording" / "chain.py"
-_HOPS = 5
+_REFUSE_PERF = Path(__file__).parent.parent / "tests" / "record" / "refuse_perf.py"
 _DRAWS = 2000
 _NOTHING = "nothing"
 _SAMPLED = "LTTng, and functions at 99 Hz"
+_WITH_CLOCKS = "LTTng, Python and clocks of threads"
+_NAME = "msgflow-overhead"
+# Processes learn of a session a little later.
+_UNTIL_KNOWN = 0.5
+_CHANNEL = Channel(("ros2:*",), "1M", 4)
+# Says how long a call of a tracepoint takes, for each line of its input.
+_CALL = """
+import ctypes, sys, time
+event = ctypes.CDLL(sys.argv[1]).ros_trace_callback_end
+event.argtypes, event.restype = [ctypes.c_void_p], None
+for _ in sys.stdin:
+    times = []
+    for _ in range(50):
+        begin = time.perf_counter_ns()
+        for _ in range(500):
+            event(0)
+        times.append(time.perf_counter_ns() - begin)
+    print(min(times) / 500, flush=True)
+"""
 
 
 @dataclass(frozen=True)
@@ -68,16 +92,18 @@ class Block:
 class Chain:
     """The nodes, in a domain of their own."""
 
-    def __init__(self, python: Path, environment: dict[str, str], domain: int, work: float) -> None:
+    def __init__(
+        self, python: Path, environment: dict[str, str], domain: int, hops: int, work: float
+    ) -> None:
         self._nodes = [
             subprocess.Popen(
-                [python, _CHAIN, str(number), str(_HOPS), str(domain), str(work)],
+                [python, _CHAIN, str(number), str(hops), str(domain), str(work)],
                 env=environment,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 text=True,
             )
-            for number in range(_HOPS + 1)
+            for number in range(hops + 1)
         ]
         for node in self._nodes:
             assert node.stdout is not None
@@ -112,6 +138,7 @@ def main() -> None:
     parser.add_argument("--python", type=Path, required=True, help="Python with rclpy")
     parser.add_argument("--rounds", type=int, default=20)
     parser.add_argument("--messages", type=int, default=50, help="of a kind and round")
+    parser.add_argument("--hops", type=int, default=5, help="from the first to the last node")
     parser.add_argument("--rate", type=float, default=10, help="messages per second")
     parser.add_argument("--work", type=float, default=0.05, help="seconds before a node sends on")
     parser.add_argument("--seed", type=int, default=0, help="of the order")
@@ -130,16 +157,18 @@ def measure(given: argparse.Namespace) -> dict[str, list[Block]]:
         stack.enter_context(one_at_a_time())
         stack.enter_context(session_daemon(with_kernel=True, note=print))
         library = str(build_tracetools(directory))
+        measure_events(library, directory)
         environment = ros_environment(given.python) | {"LD_PRELOAD": library}
-        plain = Chain(given.python, environment, 41, given.work)
+        plain = Chain(given.python, environment, 41, given.hops, given.work)
         stack.callback(plain.end)
         environment["PYTHONPATH"] = str(PYTHON_NODES)
-        traced = Chain(given.python, environment, 42, given.work)
+        traced = Chain(given.python, environment, 42, given.hops, given.work)
         stack.callback(traced.end)
         kinds = {
             _NOTHING: (plain, False, False),
             "LTTng": (plain, True, False),
             "LTTng and Python": (traced, True, False),
+            _WITH_CLOCKS: (traced, True, False),
             "the tracer, nothing recorded": (traced, False, False),
         }
         if (reason := perf.why_not(["--all-cpus"])) is None:
@@ -160,6 +189,11 @@ def measure(given: argparse.Namespace) -> dict[str, list[Block]]:
                     recording.enter_context(
                         _recorded(place, is_recorded=is_recorded, with_kernel=with_kernel)
                     )
+                    if kind == _WITH_CLOCKS:
+                        recording.enter_context(
+                            cpu_time.recorded_cpu_time(_NAME, place, _CHANNEL, print)
+                        )
+                        time.sleep(_UNTIL_KNOWN)
                     if kind == _SAMPLED:
                         rate = Rate(99, "fp")
                         recording.enter_context(
@@ -179,16 +213,51 @@ def _recorded(place: Path, *, is_recorded: bool, with_kernel: bool) -> Iterator[
         yield
         return
     place.mkdir()
-    channel = Channel(("ros2:*",), "1M", 4)
-    with recording_session("msgflow-overhead", place, channel, with_kernel=with_kernel):
-        # Processes learn of a session a little later.
-        time.sleep(0.5)
+    with recording_session(_NAME, place, _CHANNEL, with_kernel=with_kernel):
+        time.sleep(_UNTIL_KNOWN)
         yield
 
 
+def measure_events(library: str, directory: Path) -> None:
+    """Print what an event of a callback costs, without and with the clock of its thread."""
+    command = [sys.executable, "-c", _CALL, library]
+    with contextlib.ExitStack() as stack:
+
+        def started(*before: str | Path) -> Callable[[], float]:
+            child = stack.enter_context(
+                subprocess.Popen(
+                    [*before, *command], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+                )
+            )
+            stack.callback(child.kill)
+
+            def measured() -> float:
+                assert child.stdin is not None
+                assert child.stdout is not None
+                print(file=child.stdin, flush=True)
+                return float(child.stdout.readline())
+
+            return measured
+
+        usual, refused = started(), started(sys.executable, _REFUSE_PERF)
+        nothing = usual()
+        for process in (usual, refused):
+            place = directory / f"events-{process is usual}"
+            with _recorded(place, is_recorded=True, with_kernel=False):
+                alone = process() - nothing
+                with cpu_time.recorded_cpu_time(_NAME, place, _CHANNEL, print):
+                    time.sleep(_UNTIL_KNOWN)
+                    print(
+                        f"an event {alone:.0f} ns, with the clock of its thread"
+                        f" {process() - nothing:.0f} ns"
+                        + ("" if process is usual else " where perf_event_open is refused")
+                    )
+
+
 def _size(place: Path) -> tuple[int, int]:
-    """Return the events of a recording, and their bytes."""
-    with trace.open([place]) as traces:
+    """Return the events of a recording, and their bytes, without the clocks of threads."""
+    parts = [part for part in place.iterdir() if part.is_dir() and part.name != cpu_time.DIRECTORY]
+    with trace.open(parts) as traces:
         for _ in traces.batches():
             pass
         return sum(traces.event_counts.values()), recorded_bytes(place)

@@ -169,6 +169,7 @@ class Database:
         seconds: float | None = None,
         kernel: bool = False,
         profile: str | None = None,
+        cpu_time: bool = True,
         note: Callable[[str], None] = warnings.warn,
     ) -> IngestReport:
         """Record a ROS 2 system with LTTng, and ingest it as the run with the directory's name.
@@ -182,6 +183,7 @@ class Database:
             seconds: how long to record.
             kernel: also record what the scheduler does.
             profile: also sample functions: '99' times a second, or '99:dwarf'.
+            cpu_time: also read the clocks of threads, where perf_event_open is allowed.
             note: gets sentences about what is wrong with the recording.
 
         Raises:
@@ -202,6 +204,7 @@ class Database:
             seconds=seconds,
             kernel=kernel,
             profile=None if profile is None else read_rate(profile),
+            cpu_time=cpu_time,
             note=note,
             show=lambda status: None,
         )

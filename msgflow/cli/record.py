@@ -42,6 +42,7 @@ def command(
     events: list[str] | None = None,
     without: Annotated[list[str] | None, typer.Option()] = None,
     python: bool = True,
+    cpu_time: bool = True,
     print_python_path: bool = False,
     subbuf_size: str = "1M",
     num_subbuf: Annotated[int, typer.Option(min=2)] = 4,
@@ -65,6 +66,7 @@ def command(
         dual (SESSION): Also write this snapshot session: nodes that run already.
         without (EVENT): Leave out events, such as rclcpp_executor_wait_for_work; repeatable.
         python: Trace callbacks and executors of Python nodes of COMMAND.
+        cpu_time: Read the clocks of threads where perf_event_open is allowed: what computes.
         print_python_path: Only print the folder that does so, in front of PYTHONPATH.
         subbuf_size (SIZE): Size of a sub-buffer of LTTng, per CPU.
         num_subbuf: Number of sub-buffers, per CPU.
@@ -110,6 +112,7 @@ def command(
             snapshot=dual,
             python=python,
             profile=None if profile is None else read_rate(profile),
+            cpu_time=cpu_time,
             note=print_note,
             show=show,
         )

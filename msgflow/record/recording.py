@@ -7,12 +7,13 @@ import shlex
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from msgflow.errors import RecordingError
+from msgflow.record.cpu_time import DIRECTORY, recorded_cpu_time
 from msgflow.record.daemon import session_daemon
 from msgflow.record.event_cost import measure_event_cost
 from msgflow.record.lttng import losses, process_with_library, ros_processes, sessions
@@ -34,6 +35,7 @@ from msgflow.record.session import (
     require_new,
     require_snapshot,
 )
+from msgflow.record.system_samples import sampled
 from msgflow.sql.interrupt import noted_interrupts, until_interrupted
 from msgflow.trace.ctf.packet_index import content_bytes
 
@@ -57,8 +59,11 @@ class Status:
     """How a recording goes."""
 
     seconds: float  # since it began
-    event_bytes: int  # bytes of all events on the disk; others are still in the buffers
-    discarded: int  # events for which the buffers were too small
+    # Bytes of all events on the disk, without the clocks of threads; others are still in buffers.
+    event_bytes: int
+    # Events for which the buffers were too small; 0 where events are left out, of which LTTng tells
+    # nothing before the end.
+    discarded: int
     free_bytes: int  # of the disk
 
 
@@ -84,6 +89,7 @@ def record(
     snapshot: str | None = None,
     python: bool = True,
     profile: Rate | None = None,
+    cpu_time: bool = True,
     note: Callable[[str], None],
     show: Callable[[Status], None],
 ) -> Recorded:
@@ -92,9 +98,10 @@ def record(
     The directory must not exist, or be empty. `log` is a new file that gets what the program
     prints, if it prints anything; None is our stderr. `snapshot` is a snapshot session that has the
     initialisation of nodes that run already; what it has is written too. `python` also traces
-    callbacks and executors of the program's nodes of rclpy. `note` gets sentences about what is
-    wrong with the recording. `show` gets the status twice a second; what it raises ends the
-    recording. After Ctrl-C or SIGTERM nothing of the recording stays but what is written.
+    callbacks and executors of the program's nodes of rclpy. `cpu_time` also records the clocks of
+    threads. `note` gets sentences about what is wrong with the recording. `show` gets the status
+    twice a second; what it raises ends the recording. After Ctrl-C or SIGTERM nothing of the
+    recording stays but what is written.
     """
     if program:
         require_program(program[0])
@@ -121,6 +128,7 @@ def record(
         if profile is not None:
             samples = recorded_samples(directory, profile, is_ours=bool(program), note=note)
             stack.enter_context(samples)
+        stack.enter_context(sampled(directory, note))
         output = None
         if log is not None:
             output = stack.enter_context(_written(log))
@@ -128,7 +136,12 @@ def record(
         watch = _Watch(name, directory, channel, note, show, expects_nodes=bool(program))
         with ExitStack() as running:
             started = None
-            with recording_session(name, directory, channel, with_kernel=by_lttng):
+            clocks = recorded_cpu_time(name, directory, channel, note)
+            with (
+                # Clocks of all events: they begin before these, and end after them.
+                clocks if cpu_time else nullcontext(),
+                recording_session(name, directory, channel, with_kernel=by_lttng),
+            ):
                 interrupts.check()
                 if program:
                     environment = with_python_nodes(note) if python else dict(os.environ)
@@ -219,7 +232,9 @@ class _Watch:
         free = shutil.disk_usage(self.directory).free
         written = recorded_bytes(self.directory)
         self.status = replace(before, seconds=passed, event_bytes=written, free_bytes=free)
-        self.status = replace(self.status, discarded=losses(self.name))
+        # The daemon of LTTng 2.13 crashes when it lists a session that leaves events out.
+        if not self.channel.without:
+            self.status = replace(self.status, discarded=losses(self.name))
         self.show(self.status)
         if self.status.discarded and not before.discarded:
             self.note(
@@ -251,13 +266,14 @@ class _Watch:
 
 
 def recorded_bytes(directory: Path) -> int:
-    """Return the bytes of all packets that are written, without what only fills them up."""
+    """Return the bytes of all packets of events, without what only fills them up."""
+    clocks = directory / DIRECTORY
     # A chunk of it may go away meanwhile: unlike others, this walk goes on.
     return sum(
         content_bytes(Path(folder, name))
         for folder, _, names in os.walk(directory)
         for name in names
-        if name.endswith(".idx")
+        if name.endswith(".idx") and not Path(folder).is_relative_to(clocks)
     )
 
 

@@ -37,6 +37,8 @@ class Channel:
     # Length of the chunks that the recording is cut into; None: it is not.
     rotation_ns: int | None = None
     without: tuple[str, ...] = ()  # names of events, or patterns of them, that are left out
+    contexts: tuple[str, ...] = CONTEXTS  # what each event has besides, in the words of LTTng
+    is_per_process: bool = False  # each process has buffers of its own, else each user
 
 
 @contextmanager
@@ -59,7 +61,7 @@ def recording_session(
         raise
     try:
         _set_up("--userspace", name, channel)
-        contexts = [f"--type={context}" for context in CONTEXTS]
+        contexts = [f"--type={context}" for context in channel.contexts]
         lttng("add-context", *_to_channel("--userspace", name), *contexts)
         if with_kernel:
             # All in one call.
@@ -160,7 +162,8 @@ def can_trace_kernel() -> bool:
 
 def _set_up(domain: str, name: str, channel: Channel) -> None:
     sizes = (f"--subbuf-size={channel.sub_buffer_size}", f"--num-subbuf={channel.sub_buffers}")
-    lttng("enable-channel", domain, f"--session={name}", *sizes, _CHANNEL)
+    buffers = ("--buffers-pid",) if channel.is_per_process else ()
+    lttng("enable-channel", domain, f"--session={name}", *sizes, *buffers, _CHANNEL)
     for event in channel.events:
         # LTTng refuses what the event does not have.
         out = [each for each in channel.without if fnmatchcase(each, event)]

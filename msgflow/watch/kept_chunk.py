@@ -24,6 +24,10 @@ from msgflow.trace.numpy_arrow import to_arrow, to_numpy
 from msgflow.trace.trace_set import Batches, Report, Wanted
 from msgflow.watch.chunk import Chunk
 
+# The tracer of Python nodes says with it also what a callback took that has ended.
+_REGISTERED = "ros2:rclcpp_callback_register"
+_PAST = "^#msgflow (cpu|collect)"
+
 
 @dataclass(frozen=True, eq=False)
 class KeptChunk:
@@ -56,6 +60,9 @@ class KeptChunk:
         kept = {name: batch for name, batch in self.events.items() if catalogue[name].is_lasting}
         if not kept:
             return None
+        if (registered := kept.get(_REGISTERED)) is not None:
+            is_past = pc.match_substring_regex(registered["symbol"].cast(pa.string()), _PAST)
+            kept[_REGISTERED] = registered.filter(pc.invert(is_past))
         return replace(self, packets=(), event_counts={}, damages=(), **_renumbered(kept))
 
     def followed_by(self, later: KeptChunk) -> KeptChunk:

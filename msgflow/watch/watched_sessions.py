@@ -51,6 +51,9 @@ def watched_place(word: str | None) -> Path:
 
 
 def _only(places: dict[str, Path], reason: str | None) -> Path:
+    # What a session writes below another one belongs to that recording.
+    recordings = set(places.values())
+    places = {name: place for name, place in places.items() if recordings.isdisjoint(place.parents)}
     if len(places) == 1:
         return next(iter(places.values()))
     if places:

@@ -181,7 +181,8 @@ def test_shares_of_known_functions(robot: list[str], tmp_path: Path) -> None:
         capture_output=True,
         env=os.environ,
     )
-    assert sorted(path.name for path in (tmp_path / "trace").iterdir()) == [TEXT, "ust"]
+    names = sorted(path.name for path in (tmp_path / "trace").iterdir())
+    assert names == ["cpu", TEXT, "usage.gz", "ust"]
     with Database(tmp_path / "msgflow.duckdb") as database:
         rows = database.query("functions").to_arrow().to_pylist()
         why = database.why()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -17,6 +18,7 @@ from msgflow.record import program as module
 from msgflow.record.program import PYTHON_NODES, with_python_nodes
 
 FAKE = Path(__file__).with_name("fake_ros")
+BESIDE = re.compile("#msgflow (python|executor|source|cpu|collect|thread)")
 # A node with a subscription (7) that spins; what a test does comes in between.
 NODE = """
     from rclpy import executors, subscription, timer, service, node
@@ -67,9 +69,13 @@ class Robot:
         return ended.returncode, ended.stdout, ended.stderr
 
     def traced(self) -> list[str]:
-        """Return the events, without which Python it is, and which executor."""
+        """Return the events of callbacks and executors, without what is told beside them."""
+        return [line for line in self.lines() if not BESIDE.search(line)]
+
+    def lines(self, word: str = "") -> list[str]:
+        """Return all events that have the word."""
         lines = self.trace.read_text().splitlines() if self.trace.exists() else []
-        return [line for line in lines if "#msgflow python" not in line and "executor " not in line]
+        return [line for line in lines if word in line]
 
 
 @pytest.fixture(autouse=True)
@@ -214,6 +220,199 @@ def test_an_exception_ends_the_callback(robot: Robot) -> None:
     """)
     assert (code, out, error) == (3, "", "")
     assert robot.traced()[-1] == "callback_end 7"
+
+
+def test_the_cpu_time_of_a_callback_is_that_of_its_thread(robot: Robot) -> None:
+    """A callback that sleeps has none, one that spins has that of what it runs, and all end."""
+    code, out, error = robot.run("""
+        import time
+
+        def computing(message):
+            before = time.thread_time_ns()
+            while time.thread_time_ns() - before < 30_000_000:
+                pass
+            print(time.thread_time_ns() - before)
+
+        def spinning(message):
+            executor.spin_once()
+
+        def failing(message):
+            time.sleep(0.03)
+            raise SystemExit(3)
+
+        callbacks = [spinning, computing, failing]
+        for number, callback in enumerate(callbacks, 7):
+            executor.ready.append((subscription.Subscription(number, callback), [1]))
+        task = executor.wait_for_ready_callbacks()
+        executor.tasks.clear()
+        task()
+        executor.spin_once()
+    """)
+    assert (code, error) == (3, "")
+    told = [line for line in robot.lines() if re.search("callback_end|#msgflow cpu", line)]
+    ends = [line for line in told if line.startswith("callback_end")]
+    assert ends == ["callback_end 8", "callback_end 7", "callback_end 9"]
+    # Each right behind its end.
+    assert told[::2] == ends
+    inner, outer, asleep = (int(line.split()[1]) for line in told[1::2])
+    assert int(out.split()[0]) <= inner <= outer < inner + 10_000_000
+    assert asleep < 10_000_000
+
+
+def test_each_step_of_a_coroutine_has_its_cpu_time(robot: Robot) -> None:
+    robot.run("""
+        import threading
+        future = executors.Future()
+
+        async def slowly(message):
+            await future
+
+        executor.ready = [(subscription.Subscription(7, slowly), [1])]
+        executor.spin_once()
+        future.is_done = True
+        # Its clock is another one.
+        thread = threading.Thread(target=executor.tasks[0], name="second")
+        thread.start()
+        thread.join()
+    """)
+    assert len(robot.lines("#msgflow cpu")) == len(robot.lines("callback_end")) == 2
+    assert all(int(line.split()[1]) < 100_000_000 for line in robot.lines("#msgflow cpu"))
+    assert [line.split()[-1] for line in robot.lines("#msgflow thread")] == ["MainThread", "second"]
+
+
+@pytest.mark.parametrize(
+    "harm",
+    ["del time.thread_time_ns", "time.thread_time_ns = lambda: 1 / 0"],
+    ids=["none", "fails"],
+)
+def test_a_clock_that_is_missing_leaves_only_that_out(robot: Robot, harm: str) -> None:
+    code = textwrap.dedent(ONE_MESSAGE)
+    assert robot.run(f"import time\n{harm}\n{code}") == (0, "hello\nover\n", "")
+    assert robot.traced()[-1] == "callback_end 7"
+    assert not robot.lines("#msgflow cpu")
+
+
+def test_a_callback_that_forks_has_its_cpu_time_once(robot: Robot) -> None:
+    robot.run("""
+        import os, time
+
+        def forking(message):
+            while time.thread_time_ns() < 100_000_000:
+                pass
+            child = os.fork()
+            if child:
+                os.waitpid(child, 0)
+
+        executor.ready = [(subscription.Subscription(7, forking), [1])]
+        executor.spin_once()
+    """)
+    assert len(robot.lines("callback_end")) == 2
+    assert len(robot.lines("#msgflow cpu")) == 1
+
+
+def test_collections_of_garbage_are_told_while_recorded(robot: Robot) -> None:
+    robot.run("""
+        import gc, os, time
+        gc.disable()
+        executor.ready = [(subscription.Subscription(7, heard), ["a"])] * 3
+        begin = time.monotonic_ns()
+        gc.collect(1)
+        print(time.monotonic_ns() - begin)
+        executor.spin_once()
+        os.remove(os.environ["FAKE_SESSION"])
+        executor.spin_once()
+        gc.collect(2)
+    """)
+    (line,) = robot.lines("#msgflow collect")
+    assert line.endswith(" #msgflow collect 1")
+    assert int(line.split()[1]) > 0
+
+
+def test_what_a_session_missed_of_a_collection_is_not_told(robot: Robot) -> None:
+    """It begins while garbage is collected: by a finalizer, which runs the executor."""
+    robot.run("""
+        import gc, os
+        gc.disable()
+        session = os.environ["FAKE_SESSION"]
+        one = subscription.Subscription(7, heard)
+        executor.ready = [(one, ["a"]), (one, ["b"]), (one, ["c"])]
+
+        class Node:
+            def __del__(self):
+                open(session, "w").close()
+                executor.spin_once()
+
+        gc.collect(0)
+        os.remove(session)
+        executor.spin_once()
+        node = Node()
+        node.itself = node
+        del node
+        gc.collect(1)
+        gc.collect(2)
+    """)
+    assert [line.split()[-1] for line in robot.lines("#msgflow collect")] == ["0", "2"]
+
+
+def test_a_tracer_that_turns_itself_off_sees_no_collections(robot: Robot) -> None:
+    assert (
+        robot.run("""
+        import gc
+        subscription.Subscription.handle = property(lambda self: 1 / 0, lambda self, to: None)
+        before = len(gc.callbacks)
+        one = subscription.Subscription(7, heard)
+        print(before - len(gc.callbacks))
+        gc.collect()
+    """)[1]
+        == "1\nover\n"
+    )
+    assert not robot.lines("#msgflow collect")
+
+
+def test_python_may_collect_garbage_while_it_ends(robot: Robot) -> None:
+    code = """
+        import gc
+        gc.set_threshold(1)
+
+        class Kept:
+            def __del__(self):
+                [[] for _ in range(1000)]
+                gc.collect()
+
+        kept = Kept()
+        kept.itself = kept
+        executor.kept = Kept()
+    """
+    assert robot.run(code) == (0, "over\n", "")
+
+
+def test_threads_have_names_in_each_session(robot: Robot) -> None:
+    """Python has no name for a thread that it did not start, and gets no object for it."""
+    code, out, error = robot.run("""
+        import _thread, os, threading
+        session = os.environ["FAKE_SESSION"]
+        one = subscription.Subscription(7, heard)
+        executor.ready = [(one, ["a"])] * 5
+        threading.current_thread().name = "first\\0 \\ud800"
+        executor.spin_once()
+        executor.spin_once()
+        os.remove(session)
+        executor.spin_once()
+        threading.current_thread().name = "renamed"
+        open(session, "w").close()
+        executor.spin_once()
+        lock = _thread.allocate_lock()
+        lock.acquire()
+        _thread.start_new_thread(lambda: (executor.spin_once(), lock.release()), ())
+        lock.acquire()
+        print(threading.active_count())
+    """)
+    assert (code, error) == (0, "")
+    assert out.split()[-2:] == ["1", "over"]
+    names = robot.lines("#msgflow thread")
+    assert [name.partition("thread ")[2] for name in names] == ["first\\0 \\ud800", "renamed"]
+    lines = robot.lines()
+    assert lines.index(names[0]) < lines.index("callback_start 7")
 
 
 def test_a_session_that_begins_later(robot: Robot) -> None:

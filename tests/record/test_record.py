@@ -98,9 +98,16 @@ def test_from_a_robot_to_an_answer(record: Record, robot: list[str], tmp_path: P
     assert "tracing took about " in ended.err
     assert "of the latencies, tracing is about " in ended.err
     assert " 0 discarded" in ended.err
-    # Only what LTTng wrote.
-    assert [path.name for path in (tmp_path / "trace").iterdir()] == ["ust"]
+    # What LTTng wrote, and the samples of the system.
+    found = sorted(path.name for path in (tmp_path / "trace").iterdir())
+    assert found == ["cpu", "usage.gz", "ust"]
+    assert "usage_left_out" not in ended.err + ended.out
     with Database(tmp_path / "msgflow.duckdb") as database:
+        slept = database.sql(
+            "SELECT n.name FROM thread_usage JOIN thread USING (thread_id) JOIN node AS n"
+            " USING (process_id) GROUP BY ALL HAVING sum(running_ns) BETWEEN 1e6 AND 5e9"
+        )
+        assert {row["name"] for row in slept.to_arrow().to_pylist()} >= {"camera", "detector"}
         (clock,) = database.query("clocks").to_arrow().to_pylist()
         (first, *_) = database.why().verdict.table.to_pylist()
     assert clock["offset_ns"] == -12_500
@@ -125,7 +132,12 @@ class TestKernel:
     ) -> None:
         ended = record("--kernel", "--duration", "5", "-o", "trace", "--", *robot, "0.05")
         assert ended.exit_code == 0, ended.err
-        assert sorted(path.name for path in (tmp_path / "trace").iterdir()) == ["perf", "ust"]
+        assert sorted(path.name for path in (tmp_path / "trace").iterdir()) == [
+            "cpu",
+            "perf",
+            "usage.gz",
+            "ust",
+        ]
         with Database(tmp_path / "msgflow.duckdb") as database:
             # In some virtual machines perf lacks the switches of a CPU that idles: then the states
             # there are unknown.
@@ -149,7 +161,8 @@ class TestKernel:
         assert ended.exit_code == 0, ended.err
         assert "perf ended before the recording" in ended.err
         assert ("is not read: perf data convert" in " ".join(ended.err.split())) == (how == "KILL")
-        assert sorted(path.name for path in (tmp_path / "trace").iterdir()) == [left, "ust"]
+        found = sorted(path.name for path in (tmp_path / "trace").iterdir())
+        assert found == ["cpu", left, "usage.gz", "ust"]
         assert "/camera → /image → /detector" in ended.out
 
 
@@ -300,7 +313,8 @@ class TestForeignDaemon:
 
     def test_a_session_of_a_killed_recording_is_removed(self, record: Record) -> None:
         record("--name", "first", after=4, number=signal.SIGKILL)
-        assert "first" in lttng("list").stdout
+        assert "first [" in lttng("list").stdout
+        assert "first-cpu [" in lttng("list").stdout
         ended = record("--name", "second", "--no-ingest", "--duration", "0.5")
         assert "the session of a recording that was killed is removed: first" in ended.err
         assert "first" not in lttng("list").stdout
@@ -336,7 +350,8 @@ class TestForeignDaemon:
         assert ended.exit_code == 0, ended.err
         assert "the session drive was destroyed by another program" in ended.err
         assert "/camera → /image → /detector" in ended.out
-        assert [path.name for path in (tmp_path / "drive").iterdir()] == ["ust"]
+        found = sorted(path.name for path in (tmp_path / "drive").iterdir())
+        assert found == ["cpu", "usage.gz", "ust"]
 
     def test_a_name_in_use_is_refused(self, record: Record, tmp_path: Path) -> None:
         ended = record("--name", "other", "--duration", "0.5")

@@ -63,7 +63,6 @@ def require_whole(found: list[dict[str, Any]]) -> None:
     """Require windows without a hole, and messages on their way to the end."""
     for before, after in itertools.pairwise(found):
         assert before["end_ns"] == after["start_ns"]
-    assert all(window["is_final"] for window in found)
     assert sum(path["reached"] for window in found for path in window["paths"]) > 30
     assert not any(window["losses"] for window in found)
 

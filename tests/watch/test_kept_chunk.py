@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import reduce
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pytest
 
@@ -51,6 +52,37 @@ def test_what_lasts_of_several_chunks_is_one_part(tmp_path: Path) -> None:
         for lasting in (parts, [one])
     )
     assert single == whole
+
+
+def test_what_a_callback_of_python_took_does_not_last() -> None:
+    """The names of its function and thread do."""
+    name = "ros2:rclcpp_callback_register"
+    said = ["cpu", "function cpu", "collect 2", "thread collect", "cpu"]
+    columns = {
+        "event_id": range(5),
+        "ts_ns": range(10, 15),
+        "symbol": [f"#msgflow {each}" for each in said],
+    }
+    chunk = KeptChunk(
+        source=Path("drive"),
+        path=Path("drive/archives/0"),
+        traces=(),
+        events={name: pa.record_batch(columns)},
+        times_ns=np.arange(10, 15),
+        packets=(),
+        event_counts={},
+        damages=(),
+        begin_ns=10,
+        end_ns=15,
+    )
+    lasting = chunk.lasting()
+    assert lasting is not None
+    assert lasting.events[name].to_pydict() == {
+        "event_id": [0, 1],
+        "ts_ns": [11, 13],
+        "symbol": ["#msgflow function cpu", "#msgflow thread collect"],
+    }
+    assert lasting.times_ns.tolist() == [11, 13]
 
 
 def test_what_this_process_recorded_is_left_out(

@@ -11,17 +11,28 @@ begin with `#msgflow`:
 * `#msgflow python VERSION` of 0: this process is traced so.
 * `#msgflow executor KIND` of an executor: the thread works for it.
 * `#msgflow function NAME` of a number: a callback of no subscription, timer or service.
+* `#msgflow source FILE:LINE` of a handle or number: where its function begins.
 * `#msgflow step` of a number: something goes on later, because of what runs here.
 * `#msgflow resume` of such a number: what goes on is the callback that begins next on the thread.
+* `#msgflow cpu` of nanoseconds: so long the callback or step that has just ended had a CPU, by the
+  clock of its thread.
+* `#msgflow collect GENERATION` of nanoseconds: so long Python has just collected garbage on the
+  thread.
+* `#msgflow thread NAME` of 0: the name that Python has for the thread, before its first callback.
+
+An interrupt that comes while Python collects garbage is raised in what runs next. Where that is the
+function here, Python only prints it; rclpy shuts its context down all the same.
 """
 
 import ctypes
 import functools
+import gc
 import inspect
 import itertools
 import os
 import sys
 import threading
+import time
 import weakref
 
 # More functions than that are no callbacks of a node, but made by it: they share a number.
@@ -39,6 +50,10 @@ _is_on = True
 # Whether a session records callbacks; asked for before each wait.
 _is_recorded = True
 _is_announced = False
+# Counts sessions: each gets the names of threads.
+_session = 1
+# When the collection of garbage that goes on began; None if it is not recorded.
+_collection_begin = None
 _numbers = itertools.count(1)
 # By symbol, of functions that belong to no subscription, timer or service.
 _functions = {}
@@ -56,6 +71,8 @@ class _Thread(threading.local):
     state = None
     # The executor that it was said to work for.
     executor = None
+    # The latest session that has its name.
+    session = 0
     # It waits for work itself, as threads of a pool do not.
     is_spinning = False
     is_waiting = False
@@ -129,6 +146,7 @@ def wrap_executors(executors):
             owner = getattr(module, "Base" + name, None) or getattr(module, name)
             _wrap(owner, "__init__", functools.partial(_made, name))
         os.register_at_fork(after_in_child=_begin_anew)
+        gc.callbacks.append(_collect)
     except Exception as error:
         _turn_off(error)
 
@@ -150,6 +168,8 @@ def _turn_off(error):
     _is_on = _is_recorded = False
     for owner, name, original in reversed(_originals):
         setattr(owner, name, original)
+    if _collect in gc.callbacks:
+        gc.callbacks.remove(_collect)
     try:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         sys.stderr.write("msgflow: this process runs without traced callbacks: %s\n" % reason)
@@ -184,6 +204,21 @@ def _register(number, symbol):
     _tracepoints.rclcpp_callback_register(number, text.encode("utf-8", "backslashreplace"))
 
 
+def _register_callback(handle, callback):
+    _register(handle, _symbol(callback))
+    _register_source(handle, callback)
+
+
+def _register_source(number, callback):
+    while isinstance(callback, functools.partial):
+        callback = callback.func
+    code = getattr(callback, "__code__", None)
+    # An object that can be called has the function of its class.
+    code = code or getattr(type(callback).__dict__.get("__call__"), "__code__", None)
+    if code is not None:
+        _register(number, "#msgflow source %s:%d" % (code.co_filename, code.co_firstlineno))
+
+
 def _begin_anew():
     """Let a process that was forked say itself what it is made of."""
     global _is_recorded, _is_announced
@@ -192,11 +227,13 @@ def _begin_anew():
 
 def _announce_again():
     """Tell a session that began just now what it has missed, as far as it is of Python."""
+    global _session
+    _session += 1
     _announce_process()
     _functions.clear()
     _thread.executor = None
     for owner in list(_owners.values()):
-        _register(owner._msgflow, _symbol(owner.callback))
+        _register_callback(owner._msgflow, owner.callback)
 
 
 def _made(kind, original):
@@ -222,7 +259,7 @@ def _own(entity):
     if callback is not None:
         for name in _ANNOUNCED[entity._msgflow_kind]:
             getattr(_tracepoints, name)(entity._msgflow, entity._msgflow)
-        _register(entity._msgflow, _symbol(callback))
+        _register_callback(entity._msgflow, callback)
         _owners[id(callback)] = entity
     entity._msgflow_callback = callback
 
@@ -251,11 +288,11 @@ def _await_or_execute(original):
         if inspect.iscoroutinefunction(callback):
             return await _Steps(callback, callback(*args), number, _thread.step)
         step = _thread.step
-        _start(number, step)
+        begin_ns = _start(number, step)
         try:
             return callback(*args)
         finally:
-            _end(number, step)
+            _end(number, step, begin_ns)
 
     return await_or_execute
 
@@ -275,20 +312,22 @@ def _number_of(callback):
             return owner._msgflow
         if (getattr(function, "__module__", None) or "").partition(".")[0] == "rclpy":
             return None
-        return _function(_symbol(function))
+        return _function(function)
     except Exception as error:
         _turn_off(error)
         return None
 
 
-def _function(symbol):
+def _function(callback, suffix=""):
     """Return the number of a function that no subscription, timer or service has."""
+    symbol = _symbol(callback) + suffix
     number = _functions.get(symbol)
     if number is None:
         if len(_functions) >= _MOST_FUNCTIONS:
             symbol = "(others)"
         number = _functions.setdefault(symbol, next(_numbers))
         _register(number, "#msgflow function " + symbol)
+        _register_source(number, callback)
     return number
 
 
@@ -301,6 +340,9 @@ def _symbol(callback):
 
 
 def _start(number, step):
+    """Begin a callback; return the CPU time of its thread until then."""
+    if _thread.session != _session:
+        _name_thread()
     if step:
         if _thread.depth:
             _ready()
@@ -309,13 +351,56 @@ def _start(number, step):
         _thread.is_unclear = False
         _tracepoints.rclcpp_executor_get_next_ready()
     _tracepoints.callback_start(number, False)
+    return _cpu_time_ns()
 
 
-def _end(number, step):
+def _end(number, step, begin_ns):
+    end_ns = _cpu_time_ns()
     # What an action does after its first callback goes on because of that.
     if not step and _thread.entity is not None and not hasattr(_thread.entity, "_msgflow"):
         _thread.step = _new_step()
     _tracepoints.callback_end(number)
+    # A process that the callback has forked has a clock that began anew.
+    if 0 < begin_ns <= end_ns:
+        _tracepoints.rclcpp_callback_register(end_ns - begin_ns, b"#msgflow cpu")
+
+
+def _cpu_time_ns():
+    try:
+        return time.thread_time_ns()
+    except Exception:  # There is no such clock.
+        return 0
+
+
+def _name_thread():
+    _thread.session = _session
+    try:
+        # A thread that Python has not started has none, and would get one from current_thread().
+        own = threading.get_ident()
+        for thread in threading.enumerate():
+            if thread.ident == own:
+                _register(0, "#msgflow thread %s" % thread.name)
+    except Exception as error:
+        _turn_off(error)
+
+
+def _collect(phase, details, is_finalizing=sys.is_finalizing):
+    """Tell how long Python collects garbage; it calls this before and after."""
+    global _collection_begin
+    # When Python ends, nothing else is sure to be there.
+    if is_finalizing():
+        return
+    try:
+        begin_ns, _collection_begin = _collection_begin, None
+        if not _is_recorded:
+            return
+        if phase == "start":
+            _collection_begin = time.monotonic_ns()
+        elif begin_ns is not None:
+            duration_ns = time.monotonic_ns() - begin_ns
+            _register(duration_ns, "#msgflow collect %d" % details["generation"])
+    except Exception as error:
+        _turn_off(error)
 
 
 def _new_step():
@@ -360,14 +445,14 @@ class _Steps:
     def _run(self, function, *args):
         before = _thread.step
         number = self._number
-        _start(number, self._step)
+        begin_ns = _start(number, self._step)
         _thread.step = self._step
         try:
             result = function(*args)
             self._rest()
             return result
         finally:
-            _end(number, self._step)
+            _end(number, self._step, begin_ns)
             # A task of asyncio has the thread only for this step.
             if not _thread.depth:
                 _thread.step = before
@@ -378,7 +463,7 @@ class _Steps:
             if not self._step:
                 self._step = _thread.step = _new_step()
             if self._callback is not None:
-                self._number = _function(_symbol(self._callback) + " (goes on)")
+                self._number = _function(self._callback, " (goes on)")
                 self._callback = None
             self._awaited = _awaited(self._coroutine)
         except Exception as error:
@@ -553,11 +638,11 @@ def _later(callback, future=None):
         _thread.step = step
         if not _is_recorded:
             return callback(*args, **kwargs)
-        _start(number, step)
+        begin_ns = _start(number, step)
         try:
             return callback(*args, **kwargs)
         finally:
-            _end(number, step)
+            _end(number, step, begin_ns)
 
     return run_steps if is_coroutine else run
 
