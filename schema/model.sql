@@ -12,11 +12,13 @@ CREATE TABLE staging.annotation_object (event_id BIGINT, process_id BIGINT, kind
 CREATE TABLE staging.annotation_output (annotation_id BIGINT, publisher_id BIGINT);
 CREATE TABLE staging.callback (callback_id BIGINT, process_id BIGINT, node_id BIGINT, kind VARCHAR,
     subscription_id BIGINT, timer_id BIGINT, service_id BIGINT, callback_handle UBIGINT,
-    symbol VARCHAR, created_ns BIGINT, event_id BIGINT);
+    symbol VARCHAR, source VARCHAR, created_ns BIGINT, event_id BIGINT);
 CREATE TABLE staging.callback_binding (start_event_id BIGINT, process_id BIGINT,
     callback_handle UBIGINT, is_intra_process BOOLEAN, callback_event_id BIGINT, kind VARCHAR,
     take_event_id BIGINT, subscription_event_id BIGINT, request_event_id BIGINT,
     call_event_id BIGINT, response_event_id BIGINT);
+CREATE TABLE staging.callback_counter (callback_instance_id BIGINT, name VARCHAR, value BIGINT);
+CREATE TABLE staging.callback_cpu (callback_instance_id BIGINT, cpu_ns BIGINT, cpu_source VARCHAR);
 CREATE TABLE staging.callback_end_alone (event_id BIGINT, trace_index INTEGER,
     previous_event_id BIGINT);
 CREATE TABLE staging.callback_group (callback_group_id BIGINT, process_id BIGINT,
@@ -62,6 +64,8 @@ CREATE TABLE staging.client_known (event_id BIGINT, process_id BIGINT, service_n
 CREATE TABLE staging.clock (clock_id BIGINT, uuid VARCHAR, clock_key VARCHAR, offset_ns BIGINT,
     drift_ppb BIGINT, reference_ns BIGINT, uncertainty_ns BIGINT, method VARCHAR,
     drift_uncertainty_ppb BIGINT, reference_clock_id BIGINT);
+CREATE TABLE staging.clock_beside (hostname VARCHAR, boot_id VARCHAR, known_hostname VARCHAR,
+    clock_key VARCHAR, origin_ns BIGINT);
 CREATE TABLE staging.cpu_schedule (number INTEGER, trace_index INTEGER, cpu INTEGER,
     length_ns BIGINT, known_ns BIGINT, start_ns BIGINT, end_ns BIGINT);
 CREATE TABLE staging.cpu_taken (thread_id BIGINT, state_start_ns BIGINT, wait_start_ns BIGINT,
@@ -92,7 +96,13 @@ CREATE TABLE staging.finding (run_id BIGINT, trace_id BIGINT, name VARCHAR, host
 CREATE TABLE staging.gap (trace_id INTEGER, cpu INTEGER, kind VARCHAR, start_ns BIGINT,
     end_ns BIGINT, event_count BIGINT, recording_index INTEGER, cpu_id INTEGER,
     covered_until_ns BIGINT, any_covered_until_ns BIGINT);
+CREATE TABLE staging.garbage_collection (process_id BIGINT, thread_id BIGINT, start_ns BIGINT,
+    end_ns BIGINT, generation INTEGER, callback_instance_id BIGINT);
 CREATE TABLE staging.host (host_id BIGINT, clock_id BIGINT, hostname VARCHAR);
+CREATE TABLE staging.host_usage (host_id BIGINT, start_ns BIGINT, end_ns BIGINT, cpus INTEGER,
+    busy_ns BIGINT, stolen_ns BIGINT, cpu_pressure_ns BIGINT, io_pressure_ns BIGINT,
+    memory_pressure_ns BIGINT, frequency_hz BIGINT, most_frequency_hz BIGINT,
+    throttle_count BIGINT);
 CREATE TABLE staging.lifecycle_transition (node_id BIGINT, at_ns BIGINT, start_state VARCHAR,
     goal_state VARCHAR);
 CREATE TABLE staging.link_packet (sent_trace_id INTEGER, received_trace_id INTEGER,
@@ -112,7 +122,8 @@ CREATE TABLE staging.node (node_id BIGINT, process_id BIGINT, name VARCHAR, name
 CREATE TABLE staging.object_node (event_id BIGINT, process_id BIGINT, node_handle UBIGINT,
     node_event_id BIGINT, is_inferred BOOLEAN, node_id BIGINT);
 CREATE TABLE staging.other_thread (other_thread_id BIGINT, host_id BIGINT, tid INTEGER,
-    name VARCHAR, clock_key VARCHAR);
+    name VARCHAR, pid INTEGER, program VARCHAR, command VARCHAR, process_id BIGINT,
+    clock_key VARCHAR);
 CREATE TABLE staging.packet (trace_index INTEGER, stream_index INTEGER, stream_class_id BIGINT,
     stream_instance_id BIGINT, cpu_id INTEGER, position BIGINT, begin_ns BIGINT, end_ns BIGINT,
     last_event_ns BIGINT, event_count BIGINT, discarded_event_count BIGINT,
@@ -130,6 +141,8 @@ CREATE TABLE staging.preemptor (thread_id BIGINT, state_start_ns BIGINT, wait_st
 CREATE TABLE staging.process (process_id BIGINT, host_id BIGINT, pid INTEGER, name VARCHAR,
     tracetools_version VARCHAR, python_version VARCHAR, first_seen_ns BIGINT, last_seen_ns BIGINT,
     pid_namespace BIGINT, life INTEGER, is_ambiguous BOOLEAN);
+CREATE TABLE staging.program_usage (host_id BIGINT, process_id BIGINT, start_ns BIGINT,
+    end_ns BIGINT, pid INTEGER, name VARCHAR, command VARCHAR, cpu_ns BIGINT, is_recorder BOOLEAN);
 CREATE TABLE staging.publication_call (start_event_id BIGINT, end_event_id BIGINT,
     trace_index INTEGER, thread_id BIGINT, process_id BIGINT, start_ns BIGINT, end_ns BIGINT,
     intra_ns BIGINT, rclcpp_ns BIGINT, rcl_ns BIGINT, rmw_ns BIGINT, dds_ns BIGINT,
@@ -151,6 +164,8 @@ CREATE TABLE staging.python_mark (event_id BIGINT, ts_ns BIGINT, thread_id BIGIN
 CREATE TABLE staging.queued_message (start_event_id BIGINT, take_id BIGINT, subscription_id BIGINT,
     thread_id BIGINT, process_id BIGINT, taken_ns BIGINT, publishing_thread_id BIGINT,
     published_ns BIGINT, end_ns BIGINT, next_ns BIGINT, is_in_order BOOLEAN);
+CREATE TABLE staging.quota_usage (host_id BIGINT, process_id BIGINT, name VARCHAR, start_ns BIGINT,
+    end_ns BIGINT, throttled_count BIGINT, throttled_ns BIGINT, cpus DOUBLE);
 CREATE TABLE staging.request (request_id BIGINT, client_id BIGINT, service_id BIGINT,
     sequence_number BIGINT, sent_ns BIGINT, taken_ns BIGINT, sender_thread_id BIGINT,
     receiver_thread_id BIGINT, callback_instance_id BIGINT, send_event_id BIGINT,
@@ -219,13 +234,17 @@ CREATE TABLE staging.thread_break (thread_id BIGINT, resumed_event_id BIGINT, re
     is_elsewhere BOOLEAN);
 CREATE TABLE staging.thread_state (number BIGINT, thread_id BIGINT, start_ns BIGINT, end_ns BIGINT,
     state VARCHAR, cpu INTEGER, priority INTEGER, preempted_by_thread_id BIGINT,
-    preempted_by_other_thread_id BIGINT, preempted_by_priority INTEGER, waker_kind VARCHAR,
-    waker_thread_id BIGINT, waker_other_thread_id BIGINT, is_loss_affected BOOLEAN);
+    preempted_by_other_thread_id BIGINT, preempted_by_priority INTEGER, is_cpu_idle BOOLEAN,
+    waker_kind VARCHAR, waker_thread_id BIGINT, waker_other_thread_id BIGINT,
+    is_loss_affected BOOLEAN);
 CREATE TABLE staging.thread_switch (thread_id BIGINT, tid INTEGER, trace_index INTEGER,
     event_id BIGINT, at_ns BIGINT, cpu INTEGER, is_on BOOLEAN, unseen_since_ns BIGINT,
     priority INTEGER, prev_state BIGINT);
 CREATE TABLE staging.thread_tid (thread_id BIGINT, clock_key VARCHAR, tid INTEGER, from_ns BIGINT,
     until_ns BIGINT);
+CREATE TABLE staging.thread_usage (thread_id BIGINT, start_ns BIGINT, end_ns BIGINT,
+    running_ns BIGINT, waiting_ns BIGINT, state VARCHAR, minor_faults BIGINT, major_faults BIGINT,
+    io_ns BIGINT, voluntary_switches BIGINT, forced_switches BIGINT);
 CREATE TABLE staging.thread_waking (thread_id BIGINT, tid INTEGER, event_id BIGINT, at_ns BIGINT,
     kind VARCHAR, clock_key VARCHAR, target_cpu INTEGER, waker_tid INTEGER, waker_name VARCHAR);
 CREATE TABLE staging.timer (timer_id BIGINT, process_id BIGINT, node_id BIGINT, period_ns BIGINT,
@@ -236,6 +255,13 @@ CREATE TABLE staging.trace (trace_id INTEGER, host_id BIGINT, path VARCHAR, uuid
     tracer VARCHAR, domain VARCHAR, start_ns BIGINT, end_ns BIGINT, event_count BIGINT,
     discarded_event_count BIGINT, has_request_events BOOLEAN);
 CREATE TABLE staging.untraced_reader (process_id BIGINT, topic_name VARCHAR, created_ns BIGINT);
+CREATE TABLE staging.usage_file (file INTEGER, recorder VARCHAR, lines BIGINT, clock_id BIGINT,
+    origin_ns BIGINT, hostname VARCHAR, host_id BIGINT, ticks BIGINT, cpus INTEGER,
+    recorders VARCHAR[]);
+CREATE TABLE staging.usage_line (file INTEGER, number BIGINT, kind VARCHAR, subject BIGINT,
+    line VARCHAR, at_ns BIGINT, before_ns BIGINT);
+CREATE TABLE staging.usage_thread (file INTEGER, subject BIGINT, process BIGINT, last_ns BIGINT,
+    thread_id BIGINT, process_id BIGINT);
 CREATE TABLE staging.user_event (user_event_id BIGINT, trace_id INTEGER, process_id BIGINT,
     thread_id BIGINT, cpu INTEGER, at_ns BIGINT, name VARCHAR, callback_instance_id BIGINT,
     fields VARCHAR, is_loss_affected BOOLEAN);

@@ -14,12 +14,22 @@ CREATE TABLE raw.thread_name (thread_index INTEGER, procname VARCHAR, first_even
     last_event_id BIGINT, first_seen_ns BIGINT, last_seen_ns BIGINT);
 -- Events of threads that changed their CPU twice faster than a thread can.
 CREATE TABLE raw.cpu_return (thread_index INTEGER, event_id BIGINT);
+-- What performance counters of a thread had counted at an event of a callback.
+CREATE TABLE raw.reading (event_id BIGINT, ts_ns BIGINT, trace_index INTEGER, cpu_id INTEGER,
+    thread_index INTEGER, event VARCHAR, callback UBIGINT, counter VARCHAR, value BIGINT);
+-- Traces that have nothing but such readings: their events are in other traces.
+CREATE TABLE staging.reader (trace_index INTEGER);
 -- Interrupts, each with the thread that it interrupted.
 CREATE TABLE raw.interrupt (trace_index INTEGER, kind ENUM('interrupt', 'softirq', 'timer'),
     start_ns BIGINT, end_ns BIGINT, tid INTEGER);
 -- Lines of `perf script`.
 CREATE TABLE raw.stack_sample (hostname VARCHAR, is_monotonic BOOLEAN, head VARCHAR,
     stack VARCHAR);
+-- Lines of samples of the system, with the host that they are of. The first of a file has the
+-- number 0, and says what is true of all.
+CREATE TABLE raw.usage (file INTEGER, hostname VARCHAR, number BIGINT, line VARCHAR);
+-- What could not be read of such files.
+CREATE TABLE staging.usage_damage (file VARCHAR, message VARCHAR);
 -- The traces.
 CREATE TABLE staging.source (trace_index INTEGER, path VARCHAR, uuid VARCHAR, domain VARCHAR,
     hostname VARCHAR, tracer VARCHAR, clock_uuid VARCHAR, clock_key VARCHAR, begin_ns BIGINT,

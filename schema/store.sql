@@ -186,6 +186,7 @@ CREATE TABLE store.callback (
     callback_handle UBIGINT,  -- Address of the callback object; an address, valid in its process
         -- until reused
     symbol VARCHAR,  -- Function registered for it; NULL: none or unresolvable
+    source VARCHAR,  -- File and line at which the function begins, in Python; NULL: not known
     created_ns BIGINT  -- First initialisation event [epoch ns] {clock process_id}
 );
 
@@ -232,8 +233,10 @@ CREATE TABLE store.callback_instance (
     end_event_id BIGINT,  -- callback_end; NULL: never seen to end [event order] {hidden}
     effective_end_event_id BIGINT,  -- callback_end, else the first event that cannot be inside
         -- [event order] {hidden}
-    is_loss_affected BOOLEAN DEFAULT false NOT NULL  -- A gap inside or beside it on its thread may
+    is_loss_affected BOOLEAN DEFAULT false NOT NULL,  -- A gap inside or beside it on its thread may
         -- hide its end or what it did
+    cpu_ns BIGINT,  -- CPU time that its thread used meanwhile; NULL: not known [ns]
+    cpu_source VARCHAR  -- What says so: 'kernel', its scheduler, or 'clock', that of the thread
     -- is_end_inferred BOOLEAN  -- No callback_end: a service callback that answers later (before
         -- Kilted), which was over at the next executor event of its thread at the latest {sql
         -- self.end_ns IS NOT NULL AND self.end_event_id IS NULL}
@@ -773,13 +776,19 @@ CREATE TABLE store.client (
 );
 
 -- One row per host, tid and name
--- view: Threads of other processes that took the CPU from a ROS thread, or woke one.
+-- view: Threads without ROS events that took the CPU from one with such events, or woke one.
 CREATE TABLE store.other_thread (
     other_thread_id BIGINT PRIMARY KEY,  -- Identity of the thread
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     host_id BIGINT NOT NULL,  -- Host it ran on {to host}
     tid INTEGER NOT NULL,  -- Thread, as the kernel numbers it; 0: idle
-    name VARCHAR  -- Its name
+    name VARCHAR,  -- Its name
+    pid INTEGER,  -- Its process, as the kernel numbers it; NULL: the kernel trace does not have it
+    program VARCHAR,  -- Name of the first thread of that process; its own where that is not known
+    command VARCHAR,  -- File that the process executed while the recording ran; NULL: not known
+    process_id BIGINT  -- Process of ROS whose other threads have events; NULL: none {to process}
+    -- is_recorder BOOLEAN  -- It records: without that, it does not run {sql regexp_full_match(
+        -- coalesce(self.program, ''), 'lttng-.*|msgflow|perf')}
 );
 
 -- One row per interval in which a thread had one state
@@ -797,6 +806,8 @@ CREATE TABLE store.thread_state (
     preempted_by_other_thread_id BIGINT,  -- Thread of another process that took the CPU {to
         -- other_thread}
     preempted_by_priority INTEGER,  -- The priority of what took the CPU
+    is_cpu_idle BOOLEAN DEFAULT false NOT NULL,  -- No thread took the CPU: the kernel let it idle,
+        -- as with a quota (main.withheld_cpu)
     waker_kind VARCHAR,  -- What ended the sleep: 'thread', 'timer', 'interrupt' or 'softirq'; with
         -- an interrupt the waker is what it interrupted. NULL: not known
     waker_thread_id BIGINT,  -- Thread that woke it {to thread}
@@ -807,7 +818,7 @@ CREATE TABLE store.thread_state (
         -- 'real_time' WHEN self.priority IS NOT NULL THEN 'normal' END}
 );
 
--- One row per wait of a thread for a CPU, and stretch in which another thread had it
+-- One row per wait of a thread for a CPU, and stretch in which another thread had it, or none
 -- view: What ran on the CPU for which a thread of a ROS process waited.
 CREATE TABLE store.preemptor (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
@@ -821,9 +832,12 @@ CREATE TABLE store.preemptor (
         -- other_thread}
     preemptor_priority INTEGER,  -- The priority of that thread
     thread_priority INTEGER  -- The priority of the thread that waited
+    -- is_cpu_idle BOOLEAN  -- No thread had the CPU: a CPU needs some microseconds until it runs a
+        -- thread, longer ones are main.withheld_cpu {sql self.preemptor_thread_id IS NULL AND
+        -- self.preemptor_other_thread_id IS NULL}
 );
 
--- One row per callback instance that waited for a CPU, and thread that had it meanwhile
+-- One row per callback instance that waited for a CPU, and thread that had it meanwhile, or none
 -- view: What ran on the CPU for which callback instances waited, and for how long.
 CREATE TABLE store.callback_preemptor (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
@@ -835,6 +849,31 @@ CREATE TABLE store.callback_preemptor (
     preemptor_priority INTEGER,  -- The priority of that thread
     preempted_ns BIGINT NOT NULL,  -- For so long, while it was preempted [ns]
     runnable_ns BIGINT NOT NULL  -- For so long, while it was woken [ns]
+    -- is_cpu_idle BOOLEAN  -- No thread had the CPU {sql self.preemptor_thread_id IS NULL AND
+        -- self.preemptor_other_thread_id IS NULL}
+);
+
+-- One row per callback instance and performance counter that was read at its begin and its end
+-- view: What performance counters of the thread counted while callback instances ran.
+CREATE TABLE store.callback_counter (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    callback_instance_id BIGINT NOT NULL,  -- The callback instance {to callback_instance}
+    name VARCHAR NOT NULL,  -- What was counted, as LTTng names it: 'instructions', 'cache_misses',
+        -- 'task_clock' (CPU time in ns)
+    value BIGINT NOT NULL  -- How much of it
+);
+
+-- One row per garbage collection of a Python node that msgflow record traced
+-- view: When the garbage collector of Python ran.
+CREATE TABLE store.garbage_collection (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    process_id BIGINT NOT NULL,  -- Process it lives in {to process}
+    thread_id BIGINT NOT NULL,  -- Thread it happened on {to thread}
+    start_ns BIGINT NOT NULL,  -- Begin [epoch ns] {clock process_id}
+    end_ns BIGINT NOT NULL,  -- End [epoch ns] {clock process_id}
+    generation INTEGER,  -- Of the objects that it looked at: 0 the youngest, 2 all
+    callback_instance_id BIGINT  -- Callback instance that it interrupted; NULL: none {to
+        -- callback_instance}
 );
 
 -- One row per callback instance that ended, on a thread whose states are known
@@ -844,7 +883,7 @@ CREATE TABLE store.callback_schedule (
     run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
     callback_instance_id BIGINT NOT NULL,  -- The callback instance {to callback_instance}
     running_ns BIGINT NOT NULL,  -- On a CPU [ns]
-    preempted_ns BIGINT NOT NULL,  -- Ready, but another thread had the CPU [ns]
+    preempted_ns BIGINT NOT NULL,  -- Ready, but the CPU was taken away [ns]
     runnable_ns BIGINT NOT NULL,  -- Woken, waiting for a CPU [ns]
     sleeping_ns BIGINT NOT NULL,  -- Waiting for something [ns]
     uninterruptible_ns BIGINT NOT NULL,  -- Waiting for a page or a disk [ns]
@@ -870,6 +909,79 @@ CREATE TABLE store.cpu_usage (
     running_ns BIGINT NOT NULL,  -- How long it ran [ns]
     frequency_hz BIGINT  -- Mean frequency of the CPU in the second, as far as it is known; NULL:
         -- not recorded [Hz]
+);
+
+-- One row per thread and time between two samples of it
+-- view: What threads of ROS processes did, as msgflow record samples them ten times a second. The
+-- rows of a thread follow each other; what is neither running_ns nor waiting_ns it slept. Both are
+-- exact for the row as a whole. No row is there before the first sample and after the last.
+CREATE TABLE store.thread_usage (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    thread_id BIGINT NOT NULL,  -- The thread {to thread}
+    start_ns BIGINT NOT NULL,  -- The sample before [epoch ns] {clock thread_id}
+    end_ns BIGINT NOT NULL,  -- The sample [epoch ns] {clock thread_id}
+    running_ns BIGINT NOT NULL,  -- On a CPU [ns]
+    waiting_ns BIGINT NOT NULL,  -- Ready, without a CPU: another thread or a quota kept it from one
+        -- [ns]
+    state VARCHAR,  -- Its state at the end: 'R' runs or waits for a CPU, 'S' sleeps, 'D' waits for
+        -- a page or a disk; others as Linux names them
+    minor_faults BIGINT,  -- Page faults that needed no disk
+    major_faults BIGINT,  -- Page faults that read from a disk
+    io_ns BIGINT,  -- Waiting for a disk, where the kernel accounts it (kernel.task_delayacct); else
+        -- 0 [ns]
+    voluntary_switches BIGINT,  -- How often it went to sleep, as counted once a second: also those
+        -- of up to a second before
+    forced_switches BIGINT  -- How often the CPU was taken away, counted likewise
+);
+
+-- One row per process that used a CPU, and time between two samples of it
+-- view: CPU time of all processes of a host, those without ROS included, as msgflow record samples
+-- it once a second. Who used none has no row.
+CREATE TABLE store.program_usage (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    host_id BIGINT NOT NULL,  -- Host it ran on {to host}
+    process_id BIGINT,  -- The process; NULL: one without ROS events {to process}
+    start_ns BIGINT NOT NULL,  -- The sample before [epoch ns] {clock host_id}
+    end_ns BIGINT NOT NULL,  -- The sample [epoch ns] {clock host_id}
+    pid INTEGER NOT NULL,  -- Process id, as msgflow record sees it
+    name VARCHAR,  -- Its name
+    command VARCHAR,  -- The begin of its command line
+    cpu_ns BIGINT NOT NULL,  -- CPU time of all its threads; counted in hundredths of a second [ns]
+    is_recorder BOOLEAN DEFAULT false NOT NULL  -- It makes the recording: msgflow, LTTng or perf
+);
+
+-- One row per quota, process in it, and time between two samples in which it held threads up
+-- view: Quotas of CPU time (cgroups, as of containers) that held their processes up, as msgflow
+-- record samples them ten times a second.
+CREATE TABLE store.quota_usage (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    host_id BIGINT NOT NULL,  -- Host {to host}
+    process_id BIGINT NOT NULL,  -- A process in it; each has a row {to process}
+    name VARCHAR NOT NULL,  -- Its cgroup, as a path
+    start_ns BIGINT NOT NULL,  -- The sample before [epoch ns] {clock host_id}
+    end_ns BIGINT NOT NULL,  -- The sample [epoch ns] {clock host_id}
+    throttled_count BIGINT NOT NULL,  -- How often all of it had to stop, until its next period
+    throttled_ns BIGINT NOT NULL,  -- For how long, the sum over CPUs [ns]
+    cpus DOUBLE  -- CPUs that it may use; NULL: not known
+);
+
+-- One row per host and time between two samples of it
+-- view: How busy hosts were, as msgflow record samples them once a second.
+CREATE TABLE store.host_usage (
+    run_id BIGINT NOT NULL,  -- Run that the row belongs to {to run}
+    host_id BIGINT NOT NULL,  -- Host {to host}
+    start_ns BIGINT NOT NULL,  -- The sample before [epoch ns] {clock host_id}
+    end_ns BIGINT NOT NULL,  -- The sample [epoch ns] {clock host_id}
+    cpus INTEGER,  -- CPUs of the machine
+    busy_ns BIGINT,  -- CPU time used, the sum over CPUs [ns]
+    stolen_ns BIGINT,  -- CPU time that the host of a virtual machine kept, likewise [ns]
+    cpu_pressure_ns BIGINT,  -- While a thread waited for a CPU; NULL: the kernel does not say [ns]
+    io_pressure_ns BIGINT,  -- While a thread waited for a disk; NULL likewise [ns]
+    memory_pressure_ns BIGINT,  -- While a thread waited for memory; NULL likewise [ns]
+    frequency_hz BIGINT,  -- Mean frequency of the CPUs at the end; NULL likewise [Hz]
+    most_frequency_hz BIGINT,  -- The mean of what they may have; NULL likewise [Hz]
+    throttle_count BIGINT  -- How often CPUs were slowed down as they were hot, the sum over
+        -- CPUs; NULL likewise
 );
 
 -- One row per function and file

@@ -28,6 +28,7 @@ from msgflow.ingest.hostnames import hostnames_of
 from msgflow.ingest.load import load_traces
 from msgflow.ingest.samples import load_samples
 from msgflow.ingest.stored_run import fallback_name, require_free_name, store_run
+from msgflow.ingest.system_samples import load_system_samples
 from msgflow.links.annotations import declare_links
 from msgflow.links.links_file import LinksFile, read_links
 from msgflow.run.choice import require_run_name
@@ -166,6 +167,9 @@ def ingest(
                         hostnames=hostnames,
                         workspace=directory,
                         interrupts=interrupts,
+                    )
+                    load_system_samples(
+                        con, beside, traces, hostnames=hostnames, interrupts=interrupts
                     )
                 refusals.require_ros_events(traces.traces, traces.event_counts, traces.damages)
                 event_count = sum(traces.event_counts.values())

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 
 import duckdb
+import numpy as np
 import pyarrow as pa
 
 from msgflow.db.store import empty
@@ -17,12 +18,19 @@ from msgflow.ingest import overlapping_traces
 from msgflow.ingest.catalogue import USER_EVENT, Tracepoint, load
 from msgflow.ingest.cpus import Cpus
 from msgflow.ingest.overlapping_traces import Corrections
+from msgflow.ingest.readings import (
+    READING,
+    of_readings_alone,
+    readings,
+    with_counters,
+    without_counters,
+)
 from msgflow.ingest.sequences import Sequences
 from msgflow.ingest.staging import RawTables
 from msgflow.ingest.user_events import is_match, matches, names_of, user_rows
 from msgflow.sql.interrupt import Interrupts
 from msgflow.trace import PACKET, EventBatch, Progress, TraceInfo, TraceSet
-from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_numpy, without
+from msgflow.trace.numpy_arrow import is_valid, text_lengths, to_arrow, to_numpy, without
 from msgflow.trace.prefetch import prefetched
 
 _TIMES = {"timestamp", "source_timestamp", "message_timestamp", "init_timestamp", "period"}
@@ -57,12 +65,14 @@ def load_traces(
     wanted = wanted_events(ignore)
     for name in superfluous(traces.traces):
         wanted.pop(name, None)
-    wanted |= dict.fromkeys(user_names)
+    wanted = with_counters(wanted, traces.traces) | dict.fromkeys(user_names)
+    readers = of_readings_alone(traces.traces)
     sources = list(_sources(traces.traces, hostnames))
     # A host is a clock and a name, as in `schema/model/identity/host.sql`.
     numbers: dict[tuple[object, object], int] = {}
     hosts = [numbers.setdefault((row[7], row[4]), len(numbers)) for row in sources]
     _insert(con, "source", sources)
+    _insert(con, "reader", ((index,) for index in readers))
     started = time.monotonic()
 
     def report(state: Progress) -> None:
@@ -78,7 +88,7 @@ def load_traces(
         sequences, cpus = Sequences(catalogue, hosts), Cpus(catalogue)
         with transaction(con), con.cursor() as beside:
             # A thread reads the next round while DuckDB inserts this one.
-            placed = _placed(batches, sequences, cpus, corrections, implausible, beside)
+            placed = _placed(batches, readers, sequences, cpus, corrections, implausible, beside)
             with contextlib.closing(prefetched(placed, 1)) as ahead:
                 for of_round in ahead:
                     interrupts.check()
@@ -127,6 +137,7 @@ def wanted_events(ignore: Sequence[str] = ()) -> dict[str, pa.Schema | None]:
 
 def _placed(
     batches: Iterable[EventBatch],
+    readers: frozenset[int],
     sequences: Sequences,
     cpus: Cpus,
     corrections: Corrections | None,
@@ -135,6 +146,7 @@ def _placed(
 ) -> Generator[list[tuple[str, pa.RecordBatch]], None, None]:
     """Yield (table, rows) of all batches, round by round.
 
+    Of traces with these indices (`readers`) only readings are kept.
     Nothing else uses the connection `beside` meanwhile.
     """
     tracepoints = load().in_traces
@@ -143,22 +155,33 @@ def _placed(
         for batch in of_round:
             tracepoint = tracepoints.get(batch.name, USER_EVENT)
             if batch.name == PACKET:
-                placed.append((PACKET, batch.batch))
+                placed.append((PACKET, _of_others(batch.batch, readers)))
             elif tracepoint.role is not None:
                 of_cpus.append((tracepoint, batch.batch))
             elif tracepoint.is_kernel:
                 placed.append(without_thread(tracepoint, batch.batch))
             else:
                 if tracepoint is USER_EVENT:
-                    rows = user_rows(beside, batch.name, batch.batch)
+                    found = [(tracepoint, user_rows(beside, batch.name, batch.batch))]
                 else:
                     rows = plausible(batch.name, batch.batch, implausible)
-                rows = rows if corrections is None else corrections.applied(rows)
-                if rows.num_rows:
-                    events.append((tracepoint, rows))
+                    found = [(READING, each) for each in readings(batch.name, rows)]
+                    found.append((tracepoint, without_counters(_of_others(rows, readers))))
+                for kind, rows in found:
+                    corrected = rows if corrections is None else corrections.applied(rows)
+                    if corrected.num_rows:
+                        events.append((kind, corrected))
         placed += cpus.place(of_cpus) if of_cpus else []
         placed += sequences.place(events) if events else []
         yield placed
+
+
+def _of_others(batch: pa.RecordBatch, left_out: frozenset[int]) -> pa.RecordBatch:
+    """Return the rows of a batch that are not of the traces with these indices."""
+    if not left_out:
+        return batch
+    is_out = np.isin(to_numpy(batch["trace_index"]), list(left_out))
+    return batch.filter(to_arrow(~is_out)) if is_out.any() else batch
 
 
 def superfluous(traces: Sequence[TraceInfo]) -> frozenset[str]:

@@ -32,7 +32,7 @@ def load_samples(
     warnings = []
     for file in sample_files([*paths, *traces.unpacked.archives]):
         shown = Path(os.path.realpath(traces.unpacked.shown(file)))
-        hostname = _given_name(shown, traces, hostnames)
+        hostname = given_name(shown, traces, hostnames)
         text = file
         try:
             if file.name == DATA:
@@ -58,7 +58,7 @@ def load_samples(
     return tuple(warnings)
 
 
-def _given_name(file: Path, traces: TraceSet, hostnames: Mapping[int, str]) -> str | None:
+def given_name(file: Path, traces: TraceSet, hostnames: Mapping[int, str]) -> str | None:
     """Return the name that was given to the host of the traces beside a file, if it is one."""
     for folder in file.parents:
         beside = [trace.index for trace in traces.traces if trace.path.is_relative_to(folder)]

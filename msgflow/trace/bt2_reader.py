@@ -86,7 +86,7 @@ class _Reading:
         # Of lost events, by recording: they go on in its next directory.
         self._counters: Counter[tuple[Any, ...]] = Counter()
         self._simultaneous: list[Any] = []
-        self._paths: dict[int, tuple[Any, Any]] = {}
+        self._paths: dict[int, list[tuple[bool, Any, Any]]] = {}
         self._rows: dict[str, list[list[Any]]] = {}
         self._packets: list[dict[str, Any]] = []
         self._round = self._event_count = self._time_ns = self._slack_ns = 0
@@ -212,16 +212,25 @@ class _Reading:
     def _values(self, event: Any) -> list[Any]:
         bt2, cls = self.bt2, event.cls
         if cls.addr not in self._paths:
-            payload, wanted = schema_of(bt2, cls.payload_field_class), self.payloads[cls.name or ""]
-            in_context = columns.paths_of(_CONTEXT, context_of(bt2, cls))
-            self._paths[cls.addr] = in_context, columns.paths_of(wanted, payload)
+            fields = [*_CONTEXT, *self.payloads[cls.name or ""]]
+            in_context = columns.paths_of(fields, context_of(bt2, cls))
+            in_payload = columns.paths_of(fields, schema_of(bt2, cls.payload_field_class))
+            is_context = [
+                place < len(_CONTEXT) or columns.is_of_context(field)
+                for place, field in enumerate(fields)
+            ]
+            self._paths[cls.addr] = list(zip(is_context, in_context, in_payload, strict=True))
         context = value_of(bt2, event.specific_context_field) or {}
         context |= value_of(bt2, event.common_context_field) or {}
         payload = value_of(bt2, event.payload_field)
-        in_context, in_payload = self._paths[cls.addr]
-        values = [columns.first_inner_value(context, paths) for paths in in_context]
+        values = [
+            columns.first_inner_value(context, of_context)
+            if is_context
+            else columns.first_inner_value(payload, of_payload)
+            for is_context, of_context, of_payload in self._paths[cls.addr]
+        ]
         values[:2] = [-1 if value is None else value for value in values[:2]]
-        return values + [columns.first_inner_value(payload, paths) for paths in in_payload]
+        return values
 
     def _flush(self, progress: Report | None) -> Iterator[EventBatch]:
         self._number()

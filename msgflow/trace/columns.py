@@ -60,6 +60,9 @@ ALIASES = b"aliases"
 BASE = b"base"
 """Key of a field's metadata: the base in which to show an integer, or the elements of an array."""
 
+CONTEXT = b"context"
+"""Key of a field's metadata: the field is a context of the event, not a part of its payload."""
+
 LABELS = b"labels"
 """Key of a field's metadata: of an enumeration, each label with its ranges of values, as JSON."""
 
@@ -78,6 +81,11 @@ def field_metadata(
             {label: list(ranges) for label, ranges in labels.items()}
         ).encode()
     return found
+
+
+def is_of_context(field: pa.Field) -> bool:
+    """Tell whether a context fills a column, and not the payload."""
+    return CONTEXT in (field.metadata or {})
 
 
 def labels_of(field: pa.Field) -> dict[str, list[tuple[int, int]]]:

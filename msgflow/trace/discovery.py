@@ -14,6 +14,9 @@ from msgflow.trace.archive import is_archive
 from msgflow.trace.model import TraceLocation
 from msgflow.trace.regular_file import irregular, read_regular, unreadable_error
 
+SYSTEM_SAMPLES = "usage.gz"
+"""The name of the file that has samples of the system, beside a recording."""
+
 _RECORD_HINT = "ros2 trace"
 _RECORDING_HINT = f"messages are not traces, record one: {_RECORD_HINT}"
 # What files with these suffixes are, and what to do; {} is the path. See also `is_archive`.
@@ -184,7 +187,7 @@ def _no_trace_error(path: Path, strays: Sequence[Path]) -> TraceError:
     if not entries:
         return TraceError(f"empty directory — {path}", hint=_RECORD_HINT)
     for entry in entries:
-        if entry.suffix in _FOREIGN:
+        if entry.suffix in _FOREIGN and entry.name != SYSTEM_SAMPLES:
             what, hint = _foreign(entry)
             return TraceError(
                 f"no CTF trace in this directory, it holds {what} — {entry}", hint=hint

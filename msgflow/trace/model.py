@@ -46,6 +46,8 @@ class TraceInfo:
     begin_ns: int | None = None  # time of the first packet's begin, epoch nanoseconds, or None
     end_ns: int | None = None  # time of the last packet's end, epoch nanoseconds, or None
     has_process_context: bool = False  # every event carries both `vpid` and `vtid`
+    # Contexts with what performance counters of the thread have counted, sorted.
+    counters: tuple[str, ...] = ()
     # Event classes declared in the metadata, sorted; they need not occur.
     event_names: tuple[str, ...] = ()
     # The events have times. Where they have none, `ts_ns` only gives their order.

@@ -57,7 +57,7 @@ def test_every_command_says_how_to_read_the_recording_again(
     words = [given.get(word, word.replace("\u00a0", " ")) for word in command.split(" ")]
     refused = msgflow(*words, "--db", older_database)
     assert refused.exit_code == 4, refused.output
-    said = f"not as this msgflow makes it: it has another table store.finding — {older_database}"
+    said = f"not as this msgflow makes it: it has another table store.callback — {older_database}"
     assert said in refused.stderr
     hint = "msgflow ingest TRACE --db NEW.duckdb reads the recording again"
     assert refused.stderr.endswith(f"\n\nhint: {hint}\n")

@@ -45,7 +45,7 @@ WHERE t.covered = 1 AND t.repaired = 0
 
 
 # The truth has the kernel's number of each thread, ours that of its namespace: names and times have
-# to be equal.
+# to be equal. It calls an idle CPU by its number.
 PREEMPTORS = """
 WITH ours AS (
     SELECT
@@ -56,12 +56,18 @@ WITH ours AS (
     LEFT JOIN other_thread AS o ON p.preemptor_other_thread_id = o.other_thread_id
 ),
 theirs AS (
-    SELECT
-        callback_instance_id AS id, regexp_replace(who, '/[0-9]+=[0-9]+$', '') AS name,
-        regexp_extract(who, '[0-9]+$')::BIGINT AS length_ns
+    SELECT id, regexp_replace(thread, '/[0-9]+$', '') AS name, sum(length_ns)::BIGINT AS length_ns
     FROM (
-        SELECT callback_instance_id, unnest(string_split(preemptors, ';')) AS who FROM compared
+        SELECT
+            callback_instance_id AS id,
+            CASE WHEN who NOT LIKE 'swapper%' THEN regexp_replace(who, '=[0-9]+$', '') END
+                AS thread,
+            regexp_extract(who, '[0-9]+$')::BIGINT AS length_ns
+        FROM (
+            SELECT callback_instance_id, unnest(string_split(preemptors, ';')) AS who FROM compared
+        )
     )
+    GROUP BY id, thread
 )
 SELECT * FROM (
     SELECT * FROM ours WHERE id IN (SELECT callback_instance_id FROM compared)

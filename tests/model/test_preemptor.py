@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from support.analysis import Analyse, Analysis
-from support.kernel_schedule import BLOCKED, HOG, KERNEL, MAIN, Kernel, call, recorded
+from support.kernel_schedule import BLOCKED, HOG, KERNEL, MAIN, TIMER, Kernel, call, recorded
 from support.ros_system import RosSystem
 from support.staged_events import Thread
 from support.thorough import few
@@ -24,8 +24,9 @@ def waits(model: Analysis) -> list[tuple[Any, ...]]:
 
 def of_callback(model: Analysis) -> list[tuple[Any, ...]]:
     return model.rows(
-        "SELECT o.tid, p.preempted_ns, p.runnable_ns FROM callback_preemptor AS p "
-        "JOIN other_thread AS o ON p.preemptor_other_thread_id = o.other_thread_id ORDER BY o.tid"
+        "SELECT coalesce(o.tid, 0) AS tid, p.preempted_ns, p.runnable_ns "
+        "FROM callback_preemptor AS p LEFT JOIN other_thread AS o "
+        "ON p.preemptor_other_thread_id = o.other_thread_id ORDER BY tid"
     )
 
 
@@ -75,6 +76,96 @@ def test_an_idle_cpu_takes_nothing_where_a_switch_to_another_thread_is_missing(
     model = analyse(system)
     assert waits(model) == []
     assert model.rows("SELECT runnable_ns, sleeping_ns FROM callback_schedule") == [(200, 100)]
+
+
+def test_a_cpu_that_the_kernel_lets_idle_was_taken_by_no_thread(
+    system: RosSystem, analyse: Analyse
+) -> None:
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1100, 41, HOG)
+    kernel.switch(1150, HOG, 0, BLOCKED)
+    kernel.switch(1300, 0, 41)
+    kernel.switch(1400, 41, 0)
+    kernel.switch(1450, 0, 41)
+    kernel.switch(2100, 41, 0, BLOCKED)
+    kernel.wake(2200, 41)
+    kernel.switch(2210, 0, 41)
+    call(system, 1000, 2000)
+    model = analyse(system)
+    # What was interrupted when the thread was woken is known, too.
+    assert model.rows("SELECT tid FROM other_thread ORDER BY tid") == [(0,), (HOG,)]
+    assert waits(model) == [(HOG, "preempted", 0, 1100, 1150, 119, 120)]
+    assert model.rows(
+        "SELECT start_ns, end_ns, preemptor_priority, is_cpu_idle FROM preemptor "
+        "WHERE state = 'preempted' ORDER BY start_ns"
+    ) == [(1100, 1150, 119, False), (1150, 1300, None, True), (1400, 1450, None, True)]
+    # What got the CPU first.
+    assert model.rows(
+        "SELECT start_ns, is_cpu_idle FROM thread_state WHERE state = 'preempted' ORDER BY start_ns"
+    ) == [(1100, False), (1400, True)]
+    assert of_callback(model) == [(0, 200, 0), (HOG, 50, 0)]
+    assert model.rows(
+        "SELECT is_cpu_idle, preempted_ns FROM callback_preemptor ORDER BY is_cpu_idle"
+    ) == [(False, 50), (True, 200)]
+
+
+def test_an_idle_cpu_is_no_thread(system: RosSystem, analyse: Analyse) -> None:
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1100, 41, 0)
+    kernel.switch(1300, 0, 41)
+    kernel.switch(2100, 41, 0, BLOCKED)
+    call(system, 1000, 2000)
+    model = analyse(system)
+    assert model.rows("SELECT start_ns, is_cpu_idle FROM preemptor") == [(1100, True)]
+    assert model.rows("SELECT tid FROM other_thread") == []
+
+
+PROGRAMS = "SELECT tid, pid, program, command, is_recorder FROM other_thread ORDER BY tid"
+DUMP = "lttng_statedump_process_state"
+
+
+def test_programs_of_other_threads(system: RosSystem, analyse: Analyse) -> None:
+    """The last word counts: of the dump, of a thread that begins, or of another program."""
+    kernel = Kernel(system)
+    kernel.add(DUMP, 100, tid=HOG, pid=5)
+    kernel.add(DUMP, 100, tid=OTHER, pid=OTHER)
+    # What perf says of a thread that begins.
+    kernel.add("sched_process_fork", 150, child_tid=None, child_pid=HOG)
+    kernel.add("sched_process_fork", 200, child_tid=HOG, child_pid=OTHER)
+    kernel.add("sched_process_exec", 300, tid=OTHER, filename="/bin/false")
+    kernel.add("sched_process_exec", 310, tid=OTHER, filename="/bin/true")
+    kernel.switch(900, 0, 41)
+    kernel.switch(1100, 41, HOG)
+    kernel.switch(1150, HOG, OTHER)
+    kernel.switch(1200, OTHER, TIMER)
+    kernel.switch(1300, TIMER, 41)
+    kernel.switch(2100, 41, 0, BLOCKED)
+    call(system, 1000, 2000)
+    assert analyse(system).rows(PROGRAMS) == [
+        (OTHER, OTHER, "thread 6", "/bin/true", False),
+        (HOG, OTHER, "thread 6", "/bin/true", False),
+        (TIMER, None, "thread 8", None, False),
+    ]
+
+
+def test_perf_says_the_process_of_what_leaves_a_cpu(system: RosSystem, analyse: Analyse) -> None:
+    """A thread of a process of ROS that has no events of its own belongs to it all the same."""
+    kernel = Kernel(system)
+    kernel.switch(900, 0, 41)
+    kernel.switch(1100, 41, HOG, perf_pid=40)
+    kernel.switch(1150, HOG, OTHER, perf_pid=40)
+    kernel.switch(1300, OTHER, 41, perf_pid=5)
+    kernel.switch(1900, 41, OTHER, perf_pid=40)
+    kernel.switch(1950, OTHER, 41, BLOCKED, perf_pid=-1)
+    kernel.switch(2100, 41, 0, BLOCKED, perf_pid=40)
+    call(system, 1000, 2000)
+    model = analyse(system)
+    assert model.rows("SELECT tid, pid, process_id FROM other_thread ORDER BY tid") == [
+        (OTHER, 5, None),
+        (HOG, 40, 1),
+    ]
 
 
 @pytest.mark.thorough

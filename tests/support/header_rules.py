@@ -15,7 +15,7 @@ SINGLE = {
     "title", "description", "cause", "cure", "grain", "kind", "severity", "note", "when", "also",
     "reads", "next", "brief",
 }  # fmt: skip
-NOTES = {"clocks", "callbacks", "kernel", "requests", "goals", "samples"}
+NOTES = {"clocks", "callbacks", "kernel", "requests", "goals", "samples", "usage"}
 # Begins of lines above the SQL.
 _HEAD = re.compile(r"(?:--[^\n]*(?:\n|$))*")
 _BRIEF = re.compile(r"^-- brief: +((?:.*\n--     )*.*)$", re.MULTILINE)

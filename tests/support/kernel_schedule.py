@@ -46,6 +46,7 @@ class Kernel:
         state: int = LOST,
         cpu: int | None = 0,
         ids: tuple[int, int, int | None] = (-1, -1, None),
+        **fields: Any,
     ) -> int:
         """Let a thread take the CPU from another one."""
         return self.add(
@@ -59,6 +60,7 @@ class Kernel:
             next_tid=after,
             next_prio=19,
             next_comm=f"thread {after}",
+            **fields,
         )
 
     def wake(self, ts: int, tid: int, cpu: int = 0, target_cpu: int = 0) -> int:

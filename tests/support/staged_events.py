@@ -22,6 +22,7 @@ from msgflow.ingest import overlapping_traces
 from msgflow.ingest.catalogue import Tracepoint, load
 from msgflow.ingest.cpus import Cpus
 from msgflow.ingest.load import without_thread
+from msgflow.ingest.readings import READING
 from msgflow.ingest.sequences import Sequences
 from msgflow.trace.columns import COMMON_SCHEMA, PACKET_SCHEMA
 
@@ -75,7 +76,10 @@ class StagedEvents:
         self.sources: dict[int, Source] = {0: Source()}
         self.events: list[tuple[str, dict[str, Any]]] = []
         self._packets: dict[int, list[dict[str, Any]]] = defaultdict(list)
+        # Traces that have nothing but readings.
+        self.readers: set[int] = set()
         self.samples: list[tuple[str, bool, str, str]] = []
+        self.usage: list[tuple[int, str, str]] = []
         self.now = 1_000
 
     def add(self, name: str, thread: Thread, /, *, ts: int | None = None, **fields: Any) -> int:
@@ -128,6 +132,19 @@ class StagedEvents:
     ) -> None:
         """Add a sample as perf writes it: its line, and those of its calls, the innermost first."""
         self.samples.append((hostname, is_monotonic, head, "\n".join(stack)))
+
+    def add_usage(
+        self, *lines: str, hostname: str = "alpha", boot: str = "", file: int = 0, cpus: int = 2
+    ) -> None:
+        """Add samples of the system: lines as msgflow record writes them, with spaces for tabs.
+
+        Within a field, a + stands for a space.
+        """
+        head = f"msgflow+usage+1 {hostname} {boot} 100 {cpus} 4711+4712"
+        is_known = any(one == file for one, *_ in self.usage)
+        for line in lines if is_known else (head, *lines):
+            text = line.replace(" ", "\t").replace("+", " ")
+            self.usage.append((file, hostname, text))
 
     def add_packet(
         self,
@@ -190,6 +207,8 @@ class StagedEvents:
                     source.origin_ns,
                 ],
             )
+        for index in self.readers:
+            con.execute("INSERT INTO staging.reader VALUES (?)", [index])
         rows: dict[str, list[dict[str, Any]]] = defaultdict(list)
         for name, row in self.ordered():
             rows[name].append(row)
@@ -235,6 +254,11 @@ class StagedEvents:
             _insert(con, f"raw.{table}", rows)
         for sample in self.samples:
             con.execute("INSERT INTO raw.stack_sample VALUES (?, ?, ?, ?)", sample)
+        count: Counter[int] = Counter()
+        for file, hostname, text in self.usage:
+            line = [file, hostname, count[file], text]
+            con.execute("INSERT INTO raw.usage VALUES (?, ?, ?, ?)", line)
+            count[file] += 1
 
     def _all_packets(self) -> list[dict[str, Any]]:
         whole = StagedEvents()
@@ -251,7 +275,7 @@ class StagedEvents:
 
 
 def _tracepoint(name: str) -> Tracepoint:
-    return {**load().tracepoints, **load().staged}[name]
+    return {**load().tracepoints, **load().staged, READING.name: READING}[name]
 
 
 def _insert(con: duckdb.DuckDBPyConnection, table: str, rows: pa.RecordBatch) -> None:

@@ -9,7 +9,13 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from msgflow.trace.columns import COMMON_SCHEMA, first_inner_value, paths_of, to_array
+from msgflow.trace.columns import (
+    COMMON_SCHEMA,
+    first_inner_value,
+    is_of_context,
+    paths_of,
+    to_array,
+)
 from msgflow.trace.ctf import arrow
 from msgflow.trace.ctf.event_body import Kind
 from msgflow.trace.ctf.event_order import Batch
@@ -58,14 +64,19 @@ class ClassPlan:
 
 def make_plan(stream: StreamLayout, layout: ClassLayout, wanted: pa.Schema) -> ClassPlan:
     """Plan the batches of an event class whose payload columns are `wanted`."""
-    columns = list(COMMON_SCHEMA)[_LEADING:]
+    columns = [*list(COMMON_SCHEMA)[_LEADING:], *wanted]
     common = _sources(layout, Scope.EVENT_CONTEXT, stream.stream.event_context, columns)
     specific = layout.event.specific_context
     of_class = _sources(layout, Scope.SPECIFIC_CONTEXT, specific, columns)
-    contexts = [first or second for first, second in zip(common, of_class, strict=True)]
-    payload = _sources(layout, Scope.PAYLOAD, layout.event.payload, wanted)
-    schema = pa.schema([*COMMON_SCHEMA, *wanted])
-    return ClassPlan(layout, stream, schema, (*contexts, *payload))
+    payload = _sources(layout, Scope.PAYLOAD, layout.event.payload, columns)
+    is_context = [*[True] * (len(columns) - len(wanted)), *map(is_of_context, wanted)]
+    sources = tuple(
+        (first or second) if is_first else third
+        for first, second, third, is_first in zip(
+            common, of_class, payload, is_context, strict=True
+        )
+    )
+    return ClassPlan(layout, stream, pa.schema([*COMMON_SCHEMA, *wanted]), sources)
 
 
 def build_batch(

@@ -101,9 +101,15 @@ def description(
         begin_ns=min(begins, default=None),
         end_ns=max(ends, default=None),
         has_process_context=all(contexts >= _PROCESS_CONTEXT for _, contexts in events),
+        counters=tuple(sorted({name for _, of in events for name in of if _is_counter(name)})),
         event_names=tuple(sorted({name for name, _ in events})),
         has_time=has_time,
     )
+
+
+def _is_counter(context: str) -> bool:
+    """Tell whether a context is what `lttng add-context --type=perf:thread:…` adds."""
+    return context.startswith("perf_thread_")
 
 
 def _tracer(environment: Mapping[str, str]) -> str | None:

@@ -68,8 +68,17 @@ SELECT
         WHEN c.kind = 'service' AND ends_with(v.service_name, '/_action/send_goal') THEN 'action'
         ELSE c.kind
     END AS kind,
-    c.subscription_id, c.timer_id, c.service_id, c.callback_handle, c.symbol, c.created_ns,
-    c.event_id
+    c.subscription_id, c.timer_id, c.service_id, c.callback_handle, c.symbol,
+    p.source, c.created_ns, c.event_id
 FROM complete AS c
+LEFT JOIN (
+    SELECT
+        process_id, number,
+        arg_max(text, event_id) AS source
+    FROM staging.python_mark
+    WHERE kind = 'source'
+    GROUP BY process_id, number
+) AS p
+    ON c.process_id = p.process_id AND c.callback_handle = p.number
 LEFT JOIN staging.subscription AS s ON c.subscription_id = s.subscription_id
 LEFT JOIN staging.service AS v ON c.service_id = v.service_id

@@ -66,6 +66,8 @@ handled AS (
     UNION ALL
     SELECT thread_index, event_id, ts_ns, callback, true, true
     FROM raw.ros2_rclcpp_callback_register
+    -- What the tracer of Python nodes says besides is of no object.
+    WHERE symbol IS NULL OR symbol NOT LIKE '#msgflow %' OR symbol LIKE '#msgflow function %'
     UNION ALL
     SELECT thread_index, event_id, ts_ns, publisher_handle, false, false FROM raw.ros2_rcl_publish
     UNION ALL

@@ -25,7 +25,7 @@ run AS MATERIALIZED (
         coalesce(
             i.end_ns, CASE WHEN i.is_loss_affected THEN i.start_ns END, x.ts_ns, 9223372036854775807
         ) AS end_ns
-    FROM staging.callback_instance AS i
+    FROM staging.callback_extent AS i
     LEFT JOIN staging.executor_event AS x ON i.effective_end_event_id = x.event_id
 ),
 around AS (

@@ -1,4 +1,5 @@
--- description: Traces read, with what their packets and events say of their extent.
+-- description: Traces read, with what their packets and events say of their extent. Those that only
+--     read performance counters have no events of their own.
 -- grain: one row per CTF trace
 -- when: staging.placed_source
 WITH extent AS (
@@ -31,4 +32,5 @@ SELECT
     s.trace_index IN (FROM with_requests) AS has_request_events
 FROM staging.placed_source AS s
 LEFT JOIN extent AS e ON s.trace_index = e.trace_index
+WHERE s.trace_index NOT IN (FROM staging.reader)
 ORDER BY trace_id
