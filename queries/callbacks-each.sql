@@ -6,8 +6,8 @@
 -- column: run_id
 -- column: start_ns BIGINT [epoch ns]  Start of the callback
 -- column: duration_ns BIGINT [ns]   From its start to its end; empty: never seen to end
--- column: running_ns BIGINT [ns]    Of that, on a CPU; empty: not traced by the kernel
--- column: preempted_ns BIGINT [ns]  Of that, another thread had the CPU
+-- column: running_ns BIGINT [ns]    Of that, on a CPU; empty: not known
+-- column: preempted_ns BIGINT [ns]  Of that, ready, but the CPU was taken away
 -- column: node, callback
 -- column: published VARCHAR         Topics of the messages it published itself, and how many of
 --     each if several
@@ -29,7 +29,7 @@ WITH instance AS (
     SELECT
         run_id, callback_instance_id, callback_id, process_id, thread_id, start_ns,
         end_ns - start_ns AS duration_ns,
-        depth, take_id, is_loss_affected
+        cpu_ns, depth, take_id, is_loss_affected
     FROM main.callback_instance
     WHERE list_contains($runs, run_id) AND start_ns >= $start_ns AND start_ns < $end_ns
 ),
@@ -57,7 +57,9 @@ published AS (
     GROUP BY callback_instance_id
 )
 SELECT
-    i.run_id, i.start_ns, i.duration_ns, s.running_ns, s.preempted_ns, l.node,
+    i.run_id, i.start_ns, i.duration_ns,
+    i.cpu_ns AS running_ns,
+    s.preempted_ns, l.node,
     l.label AS callback,
     p.topics AS published,
     coalesce(p.number, 0) AS publications,

@@ -1,7 +1,8 @@
 -- title: Callback durations and periods
 -- description: How long callbacks ran, and how far apart their starts were. Instances without an
---     end are counted separately. Where the kernel was traced, CPU time and the time without a CPU
---     stand beside the duration. The longest 99th percentile comes first.
+--     end are counted separately. CPU time stands beside the duration where it is known: the rest
+--     of the duration they slept, or waited for a CPU, which a kernel trace tells apart. The
+--     longest 99th percentile comes first.
 -- grain: one row per callback object that ran; one for all timers that a node made of one function
 --     and period
 -- variant: each BOOLEAN = false  Each callback instance, the longest first
@@ -16,15 +17,16 @@
 -- column: period_max_ns BIGINT [ns]     Longest time from one start to the next
 -- column: min_ns BIGINT [ns]        Shortest duration
 -- column: median_ns, mean_ns, p95_ns, p99_ns, max_ns, total_ns
--- column: running_median_ns BIGINT [ns]  Median CPU time; empty: not traced by the kernel
+-- column: running_median_ns BIGINT [ns]  Median CPU time; empty: not known
 -- column: running_p99_ns
--- column: preempted_p99_ns BIGINT [ns]  99 % lost the CPU to other threads for at most this long
--- column: preempted_ns BIGINT [ns]      Sum of the time for which others had the CPU
+-- column: cpu_share DOUBLE [share]  CPU time divided by duration, of those with known CPU time
+-- column: preempted_p99_ns BIGINT [ns]  99 % lost the CPU for at most this long
+-- column: preempted_ns BIGINT [ns]      Sum of the time for which they had lost it
 -- column: symbol
 -- column: callback_id BIGINT        Identity of the callback, of the first of several
 -- column: is_internal
--- brief: node, callback, count, median_ns, p99_ns, max_ns, running_p99_ns, preempted_p99_ns,
---     p95_ns, period_median_ns, mean_ns
+-- brief: node, callback, count, median_ns, p99_ns, max_ns, running_p99_ns, cpu_share,
+--     preempted_p99_ns, p95_ns, period_median_ns, mean_ns
 -- note: callbacks
 WITH instance AS (
     SELECT
@@ -35,7 +37,7 @@ WITH instance AS (
         i.start_ns - lag(i.start_ns) OVER (
             PARTITION BY i.callback_id ORDER BY i.start_ns, i.callback_instance_id
         ) AS period_ns,
-        s.running_ns, s.preempted_ns
+        i.cpu_ns, s.preempted_ns
     FROM main.callback_instance AS i
     JOIN main.callback_alike AS k ON i.callback_id = k.callback_id
     LEFT JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
@@ -53,7 +55,8 @@ measured AS (
         max(period_ns) AS period_max_ns,
         main.spread(duration_ns) AS duration,
         sum(duration_ns)::BIGINT AS total_ns,
-        quantile_disc(running_ns, [0.5, 0.99]) AS running,
+        quantile_disc(cpu_ns, [0.5, 0.99]) AS running,
+        sum(cpu_ns) / sum(duration_ns) FILTER (WHERE cpu_ns IS NOT NULL) AS cpu_share,
         quantile_disc(preempted_ns, 0.99) AS preempted_p99_ns,
         sum(preempted_ns)::BIGINT AS preempted_ns
     FROM instance
@@ -74,7 +77,7 @@ SELECT
     m.total_ns,
     m.running[1] AS running_median_ns,
     m.running[2] AS running_p99_ns,
-    m.preempted_p99_ns, m.preempted_ns, c.symbol, m.callback_id, l.is_internal
+    m.cpu_share, m.preempted_p99_ns, m.preempted_ns, c.symbol, m.callback_id, l.is_internal
 FROM measured AS m
 JOIN main.callback_label AS l ON m.callback_id = l.callback_id
 JOIN main.run AS r ON m.run_id = r.run_id

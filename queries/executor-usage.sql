@@ -27,10 +27,13 @@
 --     it
 -- column: callbacks BIGINT          Callbacks that began
 -- column: callback_share DOUBLE [share] Callback time divided by time seen, 0 to 1
+-- column: running_share DOUBLE [share]  Time on a CPU divided by the time for which msgflow record
+--     sampled the thread; NULL: it did not
+-- column: waiting_share DOUBLE [share]  Time ready without a CPU, likewise
 -- column: executor_id, thread_id
 -- brief: nodes, tid, callback_share, callback_ns, longest_ns, longest_callback, blocked_ns,
---     wait_ns, callbacks, select_ns, take_ns, process, pid, host, seen_ns, unknown_ns,
---     executor_kind
+--     wait_ns, callbacks, running_share, waiting_share, select_ns, take_ns, process, pid, host,
+--     seen_ns, unknown_ns, executor_kind
 -- note: callbacks
 WITH member AS (
     SELECT
@@ -106,6 +109,26 @@ callback AS (
     FROM main.callback_instance
     WHERE list_contains($runs, run_id) AND start_ns >= $start_ns AND start_ns < $end_ns
     GROUP BY thread_id
+),
+-- Of a sample that the window cuts, a part counts.
+sampled AS (
+    SELECT
+        thread_id, running_ns, waiting_ns,
+        end_ns - start_ns AS length_ns,
+        least(end_ns, $end_ns) - greatest(start_ns, $start_ns) AS inside_ns
+    FROM main.thread_usage
+    WHERE $has_usage
+        AND list_contains($runs, run_id)
+        AND end_ns > $start_ns
+        AND start_ns < $end_ns
+),
+usage AS (
+    SELECT
+        thread_id,
+        sum(running_ns::DOUBLE * inside_ns / length_ns) / sum(inside_ns) AS running_share,
+        sum(waiting_ns::DOUBLE * inside_ns / length_ns) / sum(inside_ns) AS waiting_share
+    FROM sampled
+    GROUP BY thread_id
 )
 SELECT
     m.run_id,
@@ -127,10 +150,11 @@ SELECT
     coalesce(c.callbacks, 0) AS callbacks,
     coalesce(s.callback_ns, 0) / nullif(greatest(m.last_ns - m.first_ns, 0), 0)::DOUBLE
         AS callback_share,
-    m.executor_id, m.thread_id
+    u.running_share, u.waiting_share, m.executor_id, m.thread_id
 FROM member AS m
 LEFT JOIN summed AS s ON m.thread_id = s.thread_id
 LEFT JOIN callback AS c ON m.thread_id = c.thread_id
+LEFT JOIN usage AS u ON m.thread_id = u.thread_id
 LEFT JOIN main.callback_instance AS i ON i.callback_instance_id = -s.longest.earlier
 LEFT JOIN main.callback_label AS l ON i.callback_id = l.callback_id
 ORDER BY m.run_id, m.hostname, m.pid, m.tid, m.thread_id

@@ -7,7 +7,7 @@
 -- column: thread VARCHAR            Thread name
 -- column: tid
 -- column: running_ns BIGINT [ns]    On a CPU
--- column: preempted_ns BIGINT [ns]  Ready, but another thread had the CPU
+-- column: preempted_ns BIGINT [ns]  Ready, but the CPU was taken away
 -- column: runnable_ns BIGINT [ns]   Woken, waiting for a CPU
 -- column: sleeping_ns BIGINT [ns]   Waiting for something
 -- column: uninterruptible_ns BIGINT [ns]  Waiting for a page or a disk

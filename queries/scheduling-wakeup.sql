@@ -36,7 +36,7 @@ taken AS (
     SELECT
         m.run_id, m.thread_id,
         m.thread_priority AS priority,
-        coalesce(b.label, o.name) AS name,
+        CASE WHEN m.is_cpu_idle THEN 'idle CPU' ELSE coalesce(b.label, o.program) END AS name,
         sum(m.end_ns - m.start_ns) AS length_ns
     FROM main.preemptor AS m
     LEFT JOIN main.thread_label AS b ON m.preemptor_thread_id = b.thread_id
@@ -45,8 +45,8 @@ taken AS (
         AND list_contains($runs, m.run_id)
         AND m.start_ns >= $start_ns
         AND m.start_ns < $end_ns
-        -- An idle CPU is not taken.
-        AND coalesce(o.tid <> 0, true)
+        -- A CPU that is idle for less begins to run the thread (main.withheld_cpu).
+        AND (NOT m.is_cpu_idle OR m.end_ns - m.start_ns >= 1_000_000)
     GROUP BY ALL
 ),
 meanwhile AS (

@@ -3,9 +3,10 @@
 --     shows it (docs/scheduling.md). The parts add up to the durations. Without kernel traces there
 --     are no rows. Callbacks that were kept from the CPU longest come first.
 -- grain: one row per callback object
--- variant: measure VARCHAR {callbacks|threads|cpu|preemption|wakeup} = 'callbacks'  What is
---     measured: the states of callbacks, those of threads, the CPU time of threads of all
---     processes, who took the CPU from which thread, or how long woken threads waited for one
+-- variant: measure VARCHAR {callbacks|threads|cpu|preemption|wakeup|programs} = 'callbacks'
+--     What is measured: the states of callbacks, those of threads, the CPU time of threads of all
+--     processes, which programs took the CPU from whom, how long woken threads waited for one, or
+--     without a kernel trace the CPU time of all programs
 -- column: run_id, node, callback
 -- column: count BIGINT              Callback instances that began in the time window and ended
 -- column: median_ns, max_ns
@@ -14,7 +15,7 @@
 -- column: running_max_ns BIGINT [ns]  Longest CPU time
 -- column: total_ns
 -- column: running_ns BIGINT [ns]    Of that, on a CPU
--- column: preempted_ns BIGINT [ns]  Of that, ready, but another thread had the CPU
+-- column: preempted_ns BIGINT [ns]  Of that, ready, but the CPU was taken away
 -- column: runnable_ns BIGINT [ns]   Of that, woken, waiting for a CPU
 -- column: sleeping_ns BIGINT [ns]   Of that, waiting for something
 -- column: uninterruptible_ns BIGINT [ns]  Of that, waiting for a page or a disk

@@ -12,7 +12,8 @@
 -- column: meanwhile_node VARCHAR [node]  Node of the callback that ran
 -- column: meanwhile_callback VARCHAR [callback]  What triggers it
 -- column: meanwhile_thread VARCHAR  Instead of a callback: thread that had the CPU for which the
---     thread of the waiting callback waited, outside of callbacks
+--     thread of the waiting callback waited, outside of callbacks; 'idle CPU': none, for a
+--     millisecond or more (main.withheld_cpu)
 -- column: waits BIGINT              Waits during which the other callback may have run
 -- column: instances BIGINT          Callback instances that ran during these waits
 -- column: overlap_min_ns BIGINT [ns]  How long it ran during waits, at least

@@ -33,10 +33,10 @@
 --     and waited for a CPU, outside of callbacks, since the message arrived (else since it can have
 --     been ready)
 -- column: run_queue_total_ns BIGINT [ns]  Sum of these times over all waits
--- column: preempted_worst_ns BIGINT [ns]  Likewise, another thread had the CPU that its thread had
---     lost
+-- column: preempted_worst_ns BIGINT [ns]  Likewise, its thread had more to do, but had lost the CPU
 -- column: preempted_total_ns BIGINT [ns]  Sum of these times over all waits
--- column: cpu_taken_by VARCHAR      What had the CPU in both: the three with the largest share
+-- column: cpu_taken_by VARCHAR      What had the CPU in both: the three with the largest share;
+--     'idle CPU': nothing, for a millisecond or more (main.withheld_cpu)
 -- column: unknown BIGINT            Of these, with an unknown start of the wait
 -- column: loss_affected BIGINT      Of these, with a gap of the trace in their wait
 -- column: callback_id, is_internal

@@ -70,7 +70,7 @@ JOIN schedule_place AS p ON s.thread_id = p.thread_id
 LEFT JOIN schedule_place AS r ON s.preemptor_thread_id = r.thread_id
 LEFT JOIN analysed.store.other_thread AS o ON s.preemptor_other_thread_id = o.other_thread_id
 -- An idle CPU is nothing that the simulation does.
-WHERE coalesce(o.tid <> 0, true)
+WHERE coalesce(s.preemptor_thread_id, s.preemptor_other_thread_id) IS NOT NULL
 UNION ALL
 SELECT
     'callback_schedule',

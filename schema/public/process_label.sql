@@ -5,13 +5,15 @@
 -- column: process_id BIGINT    The process
 -- column: nodes VARCHAR        Full names of its first two nodes, and how many more it has; without
 --     nodes its name and id, in brackets
+-- column: all_nodes VARCHAR[]  Full names of all of its nodes; NULL: none
 SELECT
     p.run_id, p.process_id,
     main.node_label(
         array_to_string(n.names[:2], ', ')
         || CASE WHEN len(n.names) > 2 THEN printf(', %d more', len(n.names) - 2) ELSE '' END,
         p.name, p.pid
-    ) AS nodes
+    ) AS nodes,
+    n.names AS all_nodes
 FROM main.process AS p
 LEFT JOIN (
     SELECT

@@ -14,15 +14,18 @@
 -- column: state VARCHAR  Its state, as in main.thread_state; 'unknown' also where the trace does
 --     not cover it. NULL: nothing is known of the thread
 -- column: priority INTEGER  Its priority, as the kernel has it
--- column: by_kind VARCHAR  What took the CPU, or ended the sleep: 'thread', or 'timer', 'interrupt'
---     or 'softirq'. NULL: not known, or the state needs none
+-- column: by_kind
 -- column: by_thread_id, by_other_thread_id, by_priority
 -- column: is_loss_affected BOOLEAN  Kernel events were lost meanwhile
 CREATE OR REPLACE MACRO main.schedule_piece(intervals, runs, max_wakers := 32) AS TABLE
 WITH RECURSIVE state AS MATERIALIZED (
     SELECT
         thread_id, start_ns, end_ns, state, priority,
-        CASE WHEN state = 'preempted' THEN 'thread' ELSE waker_kind END AS by_kind,
+        CASE
+            WHEN is_cpu_idle THEN 'idle CPU'
+            WHEN state = 'preempted' THEN 'thread'
+            ELSE waker_kind
+        END AS by_kind,
         -- Of an interrupt the waker is only what it interrupted.
         coalesce(
             preempted_by_thread_id, CASE WHEN waker_kind = 'thread' THEN waker_thread_id END

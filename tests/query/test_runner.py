@@ -59,6 +59,7 @@ def connection() -> duckdb.DuckDBPyConnection:
     )
     con.execute("CREATE TABLE thread_state (run_id BIGINT)")
     con.execute("CREATE TABLE stack_sample (run_id BIGINT)")
+    con.execute("CREATE TABLE host_usage (run_id BIGINT)")
     con.execute("CREATE SCHEMA store")
     con.execute("CREATE TABLE store.simulated_time AS FROM simulated_time")
     con.execute("CREATE SCHEMA derive")
@@ -420,6 +421,11 @@ def test_a_layer_that_was_not_traced_is_the_reason_for_no_rows(
             "stack_sample",
             "no functions were sampled: msgflow record --profile 99, see docs/functions.md",
         ),
+        (
+            "usage",
+            "host_usage",
+            "the system was not sampled: msgflow record does, see docs/record.md",
+        ),
     ],
 )
 def test_an_empty_answer_says_whether_what_it_reads_was_recorded(
@@ -640,6 +646,7 @@ def test_all_that_a_recording_may_lack_is_known(small_database: Path) -> None:
     ("table", "rows", "facts"),
     [
         ("store.thread_state", [{}], {"has_kernel"}),
+        ("store.thread_usage", [{}], {"has_usage"}),
         ("store.request", [{}], {"has_calls"}),
         ("store.flow_call", [{}], {"has_turns"}),
         ("store.link_causal", [{"kind": "direct"}], set()),

@@ -279,7 +279,7 @@ def test_what_losses_leave_open_is_not_guessed(tmp_path: Path, tracer: str) -> N
             LEFT JOIN '{simulation.truth["cpu_run"]}' AS r
                 ON s.cpu = r.cpu AND r.kernel_tid = coalesce(t.tid, o.tid)
                 AND r.start_ns <= s.start_ns AND r.end_ns >= s.end_ns
-            WHERE o.tid IS DISTINCT FROM 0
+            WHERE coalesce(s.preemptor_thread_id, s.preemptor_other_thread_id) IS NOT NULL
                 -- A thread that is back before a loss ends seems not to have gone.
                 AND NOT EXISTS (
                     FROM '{simulation.truth["kernel_loss"]}' AS l

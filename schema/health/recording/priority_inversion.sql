@@ -1,10 +1,9 @@
 -- title: Less urgent threads delay an executor with real-time priority
--- description: An executor with real-time priority lost the CPU to a less urgent thread. Or it
---     slept in a callback until another thread woke it, and that one had to wait for a CPU which a
---     thread had that is less urgent than the executor.
+-- description: An executor with real-time priority slept in a callback until another thread woke
+--     it, and that one had to wait for a CPU which a thread had that is less urgent than the
+--     executor. What the kernel itself does is real_time_limit.
 -- cause: The callback waits for what the waker does: for a lock that it holds, or a condition. With
---     its own priority the waker gets no CPU before others. Or the kernel throttles real-time
---     threads (/proc/sys/kernel/sched_rt_runtime_us).
+--     its own priority the waker gets no CPU before others.
 -- cure: Use mutexes with priority inheritance (PTHREAD_PRIO_INHERIT), raise the priority of the
 --     waker, or do not wait for it. msgflow query critical-path says what that thread did
 --     meanwhile.
@@ -13,10 +12,13 @@
 -- when: store.thread_state
 WITH urgent AS (
     SELECT
-        run_id, thread_id, start_ns, end_ns, state, priority, preempted_by_priority, waker_kind,
-        waker_thread_id
+        run_id, thread_id, start_ns, end_ns, priority, waker_thread_id
     FROM main.thread_state
-    WHERE priority < 100 AND thread_id IN (SELECT thread_id FROM main.executor_thread)
+    -- Of an interrupt the waker is only what it interrupted.
+    WHERE priority < 100
+        AND state = 'sleeping'
+        AND waker_kind = 'thread'
+        AND thread_id IN (SELECT thread_id FROM main.executor_thread)
 ),
 asleep AS (
     SELECT u.run_id, u.thread_id, u.start_ns, u.end_ns, u.priority, u.waker_thread_id
@@ -25,19 +27,12 @@ asleep AS (
         SELECT thread_id, start_ns, end_ns FROM main.callback_instance WHERE parent_id IS NULL
     ) AS i
         ON u.thread_id = i.thread_id AND u.start_ns >= i.start_ns
-    -- Of an interrupt the waker is only what it interrupted.
-    WHERE u.state = 'sleeping' AND u.waker_kind = 'thread' AND i.end_ns >= u.end_ns
+    WHERE i.end_ns >= u.end_ns
 ),
 delay AS (
     SELECT
-        run_id, thread_id,
-        end_ns - start_ns AS length_ns
-    FROM urgent
-    WHERE state = 'preempted' AND preempted_by_priority > priority
-    UNION ALL
-    SELECT
         a.run_id, a.thread_id,
-        sum(least(a.end_ns, w.end_ns) - greatest(a.start_ns, w.start_ns))
+        sum(least(a.end_ns, w.end_ns) - greatest(a.start_ns, w.start_ns)) AS length_ns
     FROM asleep AS a
     JOIN main.preemptor AS w
         ON a.waker_thread_id = w.thread_id AND w.start_ns < a.end_ns AND w.end_ns > a.start_ns

@@ -1,5 +1,6 @@
 -- description: What ran on the CPU for which callback instances waited.
--- grain: one row per callback instance, and thread that ran meanwhile, with its priority
+-- grain: one row per callback instance, and thread that ran meanwhile, with its priority, or none
+--     while the CPU was idle
 -- when: staging.preemptor
 WITH overlap AS (
     SELECT

@@ -83,7 +83,7 @@ SELECT
     coalesce(p.preemption_count, 0) AS preemption_count,
     coalesce(p.migration_count, 0) AS migration_count,
     coalesce(p.is_loss_affected, false) AS is_loss_affected
-FROM staging.callback_instance AS i
+FROM staging.callback_extent AS i
 JOIN recorded AS r ON i.thread_id = r.thread_id
 LEFT JOIN part AS p ON i.callback_instance_id = p.callback_instance_id
 LEFT JOIN interrupted AS h ON i.callback_instance_id = h.callback_instance_id

@@ -12,7 +12,7 @@ covered AS (
     SELECT
         i.callback_instance_id, i.start_ns, i.end_ns,
         unnest(range(coalesce(f.number, e.first_number), l.number + 1)) AS number
-    FROM staging.callback_instance AS i
+    FROM staging.callback_extent AS i
     JOIN extent AS e ON i.thread_id = e.thread_id
     ASOF JOIN staging.thread_state AS l ON i.thread_id = l.thread_id AND i.end_ns > l.start_ns
     ASOF LEFT JOIN staging.thread_state AS f

@@ -1,5 +1,6 @@
 -- description: What ran on the CPU for which a thread waited, one thread after the other. What the
---     next switch contradicts is not known. The other thread ran from `start_ns` to `end_ns`.
+--     next switch contradicts is not known. The other thread ran from `start_ns` to `end_ns`; its
+--     number is 0 while the CPU was idle.
 -- grain: one row per wait for a CPU and stretch of time in which another thread had it
 -- when: staging.cpu_wait
 WITH wait AS (

@@ -37,6 +37,8 @@ SELECT
     p.preemptor_thread_id AS preempted_by_thread_id,
     p.preemptor_other_thread_id AS preempted_by_other_thread_id,
     p.preemptor_priority AS preempted_by_priority,
+    p.thread_id IS NOT NULL AND p.preemptor_thread_id IS NULL
+        AND p.preemptor_other_thread_id IS NULL AS is_cpu_idle,
     w.kind AS waker_kind,
     wt.thread_id AS waker_thread_id,
     CASE WHEN wt.thread_id IS NULL THEN wo.other_thread_id END AS waker_other_thread_id,
