@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from msgflow.sql.value import Value
 
 # Notes of headers: a query with one of these has no rows where that was not recorded.
-_SOURCES = ("requests", "goals", "kernel", "samples")
+_SOURCES = ("requests", "goals", "kernel", "samples", "usage")
 # How many values of a row pass such a link, or whether its flow does.
 AMBIGUOUS = "ambiguous"
 _MARKS = (AMBIGUOUS, "is_ambiguous")

@@ -37,8 +37,10 @@ if TYPE_CHECKING:
 # The query whose paths are explained.
 _FIRST = "e2e-latency"
 # By what a culprit lacks: how to know what is not known of it.
+_SHOWS_CPU = "msgflow record shows which callbacks compute, sleep, or have no CPU"
 _RECORDED_BY = {
-    "kernel": "msgflow record --kernel shows what had the CPU",
+    "cpu": _SHOWS_CPU,
+    "samples": _SHOWS_CPU,
     "callbacks": "msgflow record -- COMMAND traces callbacks of Python nodes",
 }
 MOST_CULPRITS = 3

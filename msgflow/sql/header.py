@@ -29,6 +29,7 @@ folder are in stands before. Only what others put in front of theirs says its ki
 - `note: requests`: likewise of requests to services. The rows compare times of hosts as well.
 - `note: goals`: likewise of goals of actions.
 - `note: samples`: likewise of samples of functions. The rows compare times of hosts as well.
+- `note: usage`: likewise of samples of the system.
 - `brief`: the columns that a narrow terminal shows, the most important first. A mark behind one
   says how the rows are shown on a terminal: `(heading)`, above a table, once for each value of the
   first of these, on which the others depend; `(even 0)`, also where it is 0 in all rows, since

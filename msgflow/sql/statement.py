@@ -20,6 +20,7 @@ _AT_ONCE = 20_000
 # stands behind `WHERE $has_kernel` is not planned there.
 RECORDED = {
     "has_kernel": "EXISTS (FROM store.thread_state)",
+    "has_usage": "EXISTS (FROM store.thread_usage)",
     "has_calls": "EXISTS (FROM store.request)",
     "has_turns": "EXISTS (FROM store.flow_call)"
     " OR EXISTS (FROM store.link_causal WHERE kind <> 'direct')",

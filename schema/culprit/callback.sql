@@ -7,7 +7,10 @@
 SELECT
     9 AS place,
     *,
-    CASE WHEN measured_ns IS NULL THEN 'kernel' END AS lacks
+    CASE
+        WHEN measured_ns IS NULL THEN 'cpu'
+        WHEN waiting_ns IS NULL THEN 'samples'
+    END AS lacks
 FROM long_callback
 UNION ALL BY NAME
 -- Where no callbacks are traced: from a take to what the node publishes next.

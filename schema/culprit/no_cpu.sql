@@ -1,8 +1,8 @@
 -- title: A thread that waits for a CPU
--- description: As a kernel trace shows: before its callback, or in it. What has the CPU is named by
---     program.
+-- description: As a kernel trace or samples show: before its callback, or in it. What has the CPU
+--     is named by program; a quota by its cgroup.
 -- grain: one row per node and path
--- reads: application_path, blame, callback_cpu, callback_use, cpu_user, harm, noticed
+-- reads: application_path, blame, callback_cpu, callback_use, cpu_quota, cpu_user, harm, noticed
 -- next: query scheduling --measure preemption --node {node}
 SELECT
     5 AS place,
@@ -15,7 +15,13 @@ SELECT
     max(w.p95_ns) AS p95_ns,
     arg_max_null(w.lost, w.mean_ns) AS lost,
     arg_max_null(w.published, w.mean_ns) AS published,
-    any_value(p.program) AS other,
+    any_value(CASE WHEN q.node IS NULL AND p.reason IS NULL THEN p.program END) AS other,
+    any_value(CASE WHEN q.node IS NULL THEN p.reason END) AS reason,
+    any_value(CASE WHEN q.node IS NULL THEN p.used_cpus END) AS used_cpus,
+    any_value(coalesce(q.cpus, p.cpus)) AS cpus,
+    any_value(q.quota) AS quota,
+    any_value(q.throttled_count) AS count,
+    any_value(q.throttled_ns) AS throttled_ns,
     list(
         w.node || coalesce(w.callback, w.topic_name, '')
         || CASE WHEN w.is_run THEN '' ELSE ' cpu' END
@@ -39,8 +45,9 @@ FROM (
 ) AS w
 JOIN application_path AS a ON w.path = a.path
 LEFT JOIN callback_use AS u ON w.node = u.node AND w.callback = u.callback
-LEFT JOIN cpu_user AS p ON w.node = p.node
 CROSS JOIN noticed AS l
+LEFT JOIN cpu_user AS p ON w.node = p.node
+LEFT JOIN cpu_quota AS q ON w.node = q.node AND q.throttled_count >= l.lost
 GROUP BY w.node, w.path
 HAVING sum(w.mean_ns) >= any_value(l.least_ns)
     AND max(w.p95_ns) >= min(greatest(coalesce(u.limit_ns, l.late_ns), l.of_path * a.p95_ns))

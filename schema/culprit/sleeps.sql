@@ -4,7 +4,7 @@
 -- reads: callback_wake
 -- next: query callbacks --each --slowest 5 --node {node}
 SELECT
-    6 AS place,
+    7 AS place,
     c.*,
     c.sleeping_ns / c.measured_ns AS share,
     w.kind AS woken_by

@@ -15,7 +15,7 @@ SELECT
     CASE
         WHEN s.node IS NOT NULL THEN NULL
         WHEN b.waiting_callback IS NULL THEN 'callbacks'
-        WHEN NOT $has_kernel THEN 'kernel'
+        WHEN NOT ($has_kernel OR $has_usage) THEN 'samples'
     END AS lacks,
     [b.waiting_node || ' waits'] AS claims
 FROM blame AS b

@@ -5,6 +5,7 @@
 -- column: node VARCHAR  Node
 -- column: callback VARCHAR  What triggers it
 -- column: function VARCHAR  Its function, without its module; NULL: not known
+-- column: source VARCHAR  File and line at which the function begins; NULL: not known
 -- column: process_id BIGINT  Its process
 WITH begun AS (
     SELECT
@@ -29,7 +30,7 @@ SELECT
             lambda name, _: regexp_replace(name, '\([^()]*\)|<[^<>]*>', '', 'g')
         )), '')
     END AS function,
-    c.process_id
+    f.source, c.process_id
 FROM main.callback AS c
 LEFT JOIN begun AS b ON c.callback_id = b.callback_id
 JOIN main.callback AS f ON coalesce(b.first_id, c.callback_id) = f.callback_id

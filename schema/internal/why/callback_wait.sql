@@ -5,7 +5,7 @@
 --     the callback itself runs.
 -- grain: one row per waiting callback and callback that ran meanwhile, and one for what is not
 --     known
--- reads: callback_name, explained_wait
+-- reads: callback_name, explained_wait, thread_wait
 -- column: node VARCHAR  Node of the callback that waits
 -- column: callback VARCHAR  What triggers it
 -- column: other_node VARCHAR  Node of the callback that ran; NULL: not known
@@ -19,11 +19,27 @@ WITH wait AS MATERIALIZED (
         w.start_ns - coalesce(w.earliest_ns, w.latest_ns) AS wait_ns,
         coalesce(w.earliest_ns, w.latest_ns) AS ready_ns,
         greatest(w.busy_max_ns, 0) AS busy_ns,
-        coalesce(w.run_queue_ns + w.preempted_ns, 0) AS cpu_ns,
+        coalesce(
+            w.run_queue_ns + w.preempted_ns, u.before_ns + u.waiting_ns - f.before_ns, 0
+        ) AS cpu_ns,
         w.meanwhile_callback_ids, w.meanwhile_ns
     FROM explained_wait AS w
     JOIN callback_name AS l ON w.callback_id = l.callback_id
+    ASOF LEFT JOIN thread_wait AS f
+        ON w.thread_id = f.thread_id AND coalesce(w.earliest_ns, w.latest_ns) >= f.start_ns
+    ASOF LEFT JOIN thread_wait AS u ON w.thread_id = u.thread_id AND w.start_ns > u.start_ns
+    LEFT JOIN (
+        SELECT
+            callback_id,
+            min(start_ns) AS start_ns
+        FROM main.callback_instance
+        WHERE list_contains($runs, run_id)
+        GROUP BY callback_id
+    ) AS b
+        ON w.callback_id = b.callback_id
     WHERE w.start_ns >= $start_ns AND w.start_ns < $end_ns
+        -- What was there before the callback ran first waited for the start of its node.
+        AND coalesce(coalesce(w.earliest_ns, w.latest_ns) >= b.start_ns, true)
 ),
 -- While it awaits, its callback does not run.
 awaiting AS (

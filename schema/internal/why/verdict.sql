@@ -4,12 +4,13 @@
 --     path are on average, of those that are lost until the next ones. If nothing stands out, one
 --     row says what takes most of the slowest path.
 -- grain: one row per culprit
--- reads: application_path, breakdown, culprit
+-- reads: application_path, breakdown, callback_name, culprit
 -- column: rank BIGINT  Place, from 1; NULL: nothing stands out
 -- column: kind VARCHAR  What it does: the file of `schema/culprit`; NULL: nothing stands out
 -- column: node VARCHAR  Node; of a kind that concerns two, the one that takes the message, or waits
 -- column: callback VARCHAR  What triggers its callback; NULL: not one callback
 -- column: function VARCHAR  Function of the callback, without its module; NULL: not known
+-- column: source VARCHAR  File and line at which the function begins; NULL: not known
 -- column: other VARCHAR  Who else has to do with it: a server, a publisher, who holds a lock, or a
 --     program
 -- column: other_callback VARCHAR  What triggers the callback of that
@@ -22,7 +23,8 @@
 -- column: published BIGINT  Of so many
 -- column: headline VARCHAR  Who, what kind, how much of what
 -- column: evidence VARCHAR[]  What shows it: two lines at most
--- column: lacks VARCHAR  What was not recorded that would tell more: 'kernel' or 'callbacks'
+-- column: lacks VARCHAR  What was not recorded that would tell more: 'cpu', the CPU time of
+--     callbacks, 'samples' of the system, or 'callbacks'
 WITH numbered AS (
     SELECT
         *,
@@ -85,6 +87,13 @@ said AS (
                 coalesce(long_name, 'it'), count, topic, main.duration_text(period_ns)
             )
             WHEN 'computes' THEN printf('%s computes %s%s', long_name, run, at_times)
+            WHEN 'garbage_collection' THEN printf(
+                '%s collects garbage %.0f %% of %s%s', long_name, 100 * share, run, at_times
+            )
+            WHEN 'interpreter' THEN printf(
+                '%s waits while another thread of its process computes, %.0f %% of %s%s',
+                long_name, 100 * share, run, at_times
+            )
             WHEN 'sleeps'
                 THEN printf('%s sleeps %.0f %% of %s%s', long_name, 100 * share, run, at_times)
             WHEN 'disk' THEN printf('%s waits for the disk, for %s%s', long_name, run, at_times)
@@ -93,7 +102,18 @@ said AS (
             )
             WHEN 'no_cpu' THEN printf(
                 '%s has no CPU for %s (p95)%s', coalesce(long_name, 'its thread'),
-                main.duration_text(p95_ns), coalesce(printf(': %s has it', other), '')
+                main.duration_text(p95_ns),
+                coalesce(
+                    CASE WHEN quota IS NOT NULL
+                        THEN printf(': its quota of %.1f CPUs stops it', cpus) END,
+                    CASE reason
+                        WHEN 'quota' THEN ': a quota stops it'
+                        WHEN 'real_time_limit' THEN ': the limit of real-time threads stops it'
+                        WHEN 'unused_cpu' THEN ': its CPU is offline, or isolated'
+                    END,
+                    printf(': %s has it', other),
+                    ''
+                )
             )
             WHEN 'stale' THEN printf(
                 '%s %s data%s for up to %s', long_name,
@@ -147,6 +167,15 @@ said AS (
                                     WHEN 'softirq' THEN 'the network or a device'
                                 END
                             ),
+                            CASE WHEN kind = 'callback' THEN printf(
+                                'on a CPU for %.0f %% of it, ready without one %.0f %%',
+                                100 * running_ns / measured_ns, 100 * waiting_ns / measured_ns
+                            ) END,
+                            printf('%s used %.1f of %d CPUs', other, used_cpus, cpus::INTEGER),
+                            printf(
+                                'throttled %d times, for %s, as %s', count,
+                                main.duration_text(throttled_ns), quota
+                            ),
                             CASE WHEN load >= 0.9 AND kind <> 'overload'
                                 THEN printf('its thread is asked for %.0f %%', 100 * load) END,
                             CASE WHEN waiting_callback IS NOT NULL
@@ -161,9 +190,11 @@ said AS (
                                 THEN 'as far as times show: requests are recorded since Kilted' END,
                             CASE
                                 WHEN lacks = 'callbacks' THEN 'its callbacks are not traced'
-                                WHEN lacks = 'kernel' AND kind = 'waits'
+                                WHEN lacks = 'samples' AND kind = 'waits'
                                     THEN 'on the way, or its thread has no CPU: not known'
-                                WHEN lacks = 'kernel'
+                                WHEN lacks = 'samples'
+                                    THEN 'it sleeps or has no CPU: not known'
+                                WHEN lacks = 'cpu'
                                     THEN 'computed, slept or had no CPU: not known'
                             END
                         ],
@@ -193,8 +224,13 @@ SELECT
             harm_ns DESC,
             number
     ) AS rank,
-    kind, node, callback, function, other, other_callback, other_function, topic_name, path,
-    harm_ns, p95_ns, lost, published,
+    kind, node, callback, function,
+    (
+        SELECT any_value(n.source)
+        FROM callback_name AS n
+        WHERE n.node = said.node AND n.callback = said.callback
+    ) AS source,
+    other, other_callback, other_function, topic_name, path, harm_ns, p95_ns, lost, published,
     printf(
         '%s: %s', node,
         -- What triggers the callback stands there where the line has room for it.
@@ -207,7 +243,7 @@ SELECT
 FROM said
 UNION ALL
 SELECT
-    NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, l.path, NULL, l.p95_ns, NULL, NULL,
+    NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, l.path, NULL, l.p95_ns, NULL, NULL,
     'nothing stands out',
     list_filter(
         [
