@@ -337,7 +337,7 @@ SUMMARY = ("why", "paths", "blame", "drops", "threads")
 _PLAIN = (
     "row", "gap", "path", "executor_share", "executor_node", "neighbour", "rate", "callback",
     "callback_point", "callback_slowest", "topic_point", "topic_slowest", "service_point",
-    "service_slowest", "loss", "loss_point", "thread_name", "place", "run_before",
+    "service_slowest", "loss", "loss_point", "thread_name", "place", "run_before", "program_share",
 )  # fmt: skip
 # Named queries that list one by one what a page query counts.
 _LISTED_BY = {"loss": "topics-unmatched"}

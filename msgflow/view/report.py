@@ -152,7 +152,7 @@ class _Maker:
             self.parts[f"query?name={name}"] = content
         for name in (
             "row", "gap", "path", "executor_node", "executor_share", "callback", "loss",
-            "loss_point", "thread_name",
+            "loss_point", "thread_name", "program_share",
         ):  # fmt: skip
             self.keep(name)
         self.keep_panels()

@@ -8,7 +8,7 @@
 -- column: kind UTINYINT  13 running, 14 preempted, 15 runnable, 16 sleeping, 17 uninterruptible,
 --     18 unknown
 -- column: id BIGINT  Of a thread what took its CPU, or woke it; of a core what ran there, or took
---     it: see thread_name.sql. -1: nothing, or not known
+--     it: see thread_name.sql. -1: not known, or the state needs none; -2: nothing, the CPU is idle
 -- column: start_ns, end_ns
 -- column: flags UTINYINT  1: kernel events were lost; what woke it: 16 timer, 32 interrupt,
 --     48 softirq, neither: a thread
@@ -25,6 +25,7 @@ SELECT
     END::UTINYINT AS kind,
     coalesce(
         2 * preempted_by_thread_id, 2 * preempted_by_other_thread_id + 1,
+        CASE WHEN is_cpu_idle THEN -2 END,
         CASE WHEN waker_kind = 'thread'
             THEN coalesce(2 * waker_thread_id, 2 * waker_other_thread_id + 1) END,
         -1
@@ -44,6 +45,7 @@ SELECT
     CASE s.state WHEN 'running' THEN 13 ELSE 14 END,
     CASE
         WHEN s.state = 'running' THEN 2 * s.thread_id
+        WHEN s.is_cpu_idle THEN -2
         ELSE coalesce(2 * s.preempted_by_thread_id, 2 * s.preempted_by_other_thread_id + 1, -1)
     END,
     s.start_ns, s.end_ns,

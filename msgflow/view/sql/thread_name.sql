@@ -1,7 +1,7 @@
 -- description: What bars of thread_bar.sql call by number. Without kernel traces there are none.
--- grain: one row per thread with known states, and per other thread
+-- grain: one row per thread with known states, and per other thread; one for an idle CPU
 -- column: id BIGINT  Twice the thread_id; of a thread of another process one more than twice its
---     other_thread_id
+--     other_thread_id; -2: nothing, the CPU is idle
 -- column: name VARCHAR  Its name, and its number; of a ROS process its nodes stand first
 SELECT
     2 * t.thread_id AS id,
@@ -15,4 +15,7 @@ SELECT
     printf('%s %d', coalesce(name, '?'), tid)
 FROM main.other_thread
 WHERE run_id = $run
+UNION ALL
+SELECT -2, 'idle CPU'
+WHERE EXISTS (FROM main.thread_state WHERE run_id = $run AND is_cpu_idle)
 ORDER BY id

@@ -3,6 +3,8 @@
 import { color, h } from "./dom.js";
 import { duration, percent } from "./labels.js";
 import { pageAddress } from "./address.js";
+import { chart } from "./chart.js";
+import { SERIES_COLORS } from "./figures.js";
 import { besides, dataTable, filled } from "./table.js";
 import { downloads } from "./download.js";
 import { command, notes } from "./notice.js";
@@ -39,7 +41,58 @@ export class Executors {
   }
 
   async build() {
-    return (await Promise.all([this.threads(), this.blame(), this.waits()])).filter(Boolean);
+    const sections = [this.threads(), this.programs(), this.blame(), this.waits()];
+    return (await Promise.all(sections)).flat().filter(Boolean);
+  }
+
+  // What used the CPUs of each host over time, where that was sampled, or the kernel traced.
+  async programs() {
+    const shares = await this.app.inWindow("program_share");
+    const hosts = [...new Set(shares.host)];
+    return hosts.map((host) => {
+      const rows = shares.host.map((_, row) => row).filter((row) => shares.host[row] === host);
+      const times = [...new Set(rows.map((row) => shares.start_at[row]))].sort((a, b) => a - b);
+      const lengths = new Map(rows.map((row) => [shares.start_at[row], shares.length[row]]));
+      const programs = [...new Set(rows.map((row) => shares.program[row]))];
+      // What used no CPU has no row.
+      const used = new Map(
+        rows.map((row) => [
+          `${shares.start_at[row]} ${shares.program[row]}`,
+          shares.busy[row] / shares.length[row],
+        ]),
+      );
+      const middles = times.map((at) => at + lengths.get(at) / 2);
+      const series = programs.map((program, place) => ({
+        label: program ?? "all others",
+        color: program === null ? "soft" : SERIES_COLORS[place % SERIES_COLORS.length],
+        values: times.map((at) => used.get(`${at} ${program}`) ?? 0),
+      }));
+      return h(
+        "section",
+        {},
+        h("h2", {}, `What used the CPUs${hosts.length > 1 ? ` of ${host}` : ""}`),
+        h(
+          "p",
+          { className: "soft" },
+          "CPUs that each program used, those without ROS included. Click to see that time in the timeline.",
+        ),
+        chart(middles, series, {
+          title: `what used the CPUs of ${host}`,
+          xName: "middle [ns since begin of run]",
+          xFormat: duration,
+          xLabel: "since the begin of the run",
+          yFormat: (value) => String(Math.round(value * 100) / 100),
+          yLabel: "CPUs",
+          legend: true,
+          onClick: (at) => {
+            location.hash = pageAddress("timeline", {
+              from: Math.max(0, Math.round(times[at])),
+              to: Math.round(times[at] + lengths.get(times[at])),
+            });
+          },
+        }),
+      );
+    });
   }
 
   async threads() {
@@ -72,6 +125,7 @@ export class Executors {
       });
       this.strips.places.push({ canvas, thread: usage.thread_id[row] });
       const busy = usage.seen_ns[row] ? usage.callback_ns[row] / usage.seen_ns[row] : NaN;
+      const running = usage.running_share?.[row] ?? NaN;
       list.append(
         h(
           "div",
@@ -85,7 +139,7 @@ export class Executors {
               { className: "soft" },
               `${usage.host[row]} · ${String(usage.executor_kind[row]).replace("_", "-")} · ${
                 percent(busy)
-              } in callbacks`,
+              } in callbacks${Number.isNaN(running) ? "" : `, ${percent(running)} on a CPU`}`,
             ),
           ),
           canvas,
@@ -126,7 +180,13 @@ export class Executors {
           ["busy [ns]", shares.busy],
         ],
       }),
-      besides("as a table", dataTable(usage, { label: "executor threads", columns: OF_THREADS })),
+      besides(
+        "as a table",
+        dataTable(usage, {
+          label: "executor threads",
+          columns: [...OF_THREADS, ...filled(usage, ["running_share", "waiting_share"])],
+        }),
+      ),
       notes(usage.meta.notes),
       command(usage.meta.command),
     );

@@ -12,7 +12,15 @@ const LONGEST_UNDER_BAR = 24;
 // Room for a name that stands aslant, in pixels.
 const NAME_WIDTH = 18;
 const EVERY = { label: "every number" };
-const SERIES_COLORS = ["timer", "publication", "take", "service", "process", "blocked", "event"];
+export const SERIES_COLORS = [
+  "timer",
+  "publication",
+  "take",
+  "service",
+  "process",
+  "blocked",
+  "event",
+];
 
 export class Figures {
   // Rows: as the SQL page has them.

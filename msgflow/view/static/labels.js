@@ -35,12 +35,17 @@ export const UNINTERRUPTIBLE = 17;
 const WAKERS = ["", "a timer", "an interrupt", "a softirq"];
 export const wakerName = (flags, name) => WAKERS[(flags >> 4) & 3] || name;
 
+// What the server says where no thread took the CPU.
+export const IDLE_CPU = "idle CPU";
+
 // What a thread did in a piece of the critical path.
 export function stateText(state, who, wakers) {
   if (wakers) return `waits for ${who}, which is ${state}`;
   switch (state) {
     case "preempted":
-      return `preempted by ${who ?? "?"}`;
+      return who === IDLE_CPU
+        ? "ready, but without its CPU, which is idle (a quota, or a limit)"
+        : `preempted by ${who ?? "?"}`;
     case "runnable":
       return `waits for a CPU${who ? `, woken by ${who}` : ""}`;
     case "sleeping":
@@ -127,6 +132,11 @@ const TITLES = {
   meanwhile_node: "kept waiting by",
   meanwhile_callback: "its callback",
   meanwhile_thread: "thread that had the CPU",
+  running_median_ns: "CPU time, median",
+  running_p99_ns: "CPU time, p99",
+  cpu_share: "CPU share",
+  running_share: "on a CPU",
+  waiting_share: "ready, without a CPU",
   run_queue_worst_ns: "run queue, longest",
   preempted_worst_ns: "preempted, longest",
   cpu_taken_by: "CPU taken by",

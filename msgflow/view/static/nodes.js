@@ -2,7 +2,7 @@
 
 import { clear, h } from "./dom.js";
 import { count } from "./labels.js";
-import { besides, dataTable } from "./table.js";
+import { besides, dataTable, filled } from "./table.js";
 import { redrawCharts } from "./chart.js";
 import { commands, notes } from "./notice.js";
 import { callbackPanel, Chooser, searchField } from "./panel.js";
@@ -21,6 +21,7 @@ const COLUMNS_OF_CALLBACKS = [
   "p95_ns",
   "max_ns",
 ];
+const OF_CPU = ["running_median_ns", "running_p99_ns", "cpu_share"];
 const OF_WAITS = ["wait_median_ns", "wait_max_ns"];
 const OF_DELIVERY = ["dropped", "lost", "reasons"];
 
@@ -43,7 +44,7 @@ export class NodesPage {
     const chooser = this.chooser(callbacks, {
       key: "callback",
       label: "callbacks",
-      columns: [...COLUMNS_OF_CALLBACKS],
+      columns: [...COLUMNS_OF_CALLBACKS, ...filled(callbacks, OF_CPU)],
       sort: { name: "max_ns", down: true },
       identity: (table, row) => String(table.callback_id[row]),
       nothing: "No callback was recorded.",

@@ -204,16 +204,20 @@ export class Renderer {
       ? colors.soft
       : colors.ink;
     const room = this.labelWidth - left - 6;
-    c.fillText(
-      fit(
-        c,
-        lane.label,
-        room,
-        lane.type !== "process" && !["thread", "schedule"].includes(lane.kind),
-      ),
-      left,
-      y + lane.height / 2,
+    const text = fit(
+      c,
+      lane.label,
+      room,
+      lane.type !== "process" && !["thread", "schedule"].includes(lane.kind),
     );
+    c.fillText(text, left, y + lane.height / 2);
+    if (lane.name) {
+      const beside = c.measureText(text).width + 7;
+      c.fillStyle = colors.soft;
+      if (room - beside > 40) {
+        c.fillText(fit(c, lane.name, room - beside, true), left + beside, y + lane.height / 2);
+      }
+    }
     c.fillStyle = colors.line;
     c.fillRect(this.labelWidth - 1, y, 1, lane.height);
   }
@@ -362,7 +366,7 @@ export class Renderer {
           hatch(c, this.labelWidth + x, top + inset, width, full - inset, this.colors.page);
         }
         if (wide > 46 && kind < 5) {
-          this.nameBar(duration(length), this.labelWidth + x, top, width, full);
+          this.nameCallback(kind, lane, length, this.labelWidth + x, top, width, full);
         } else if (
           wide > 46 && (kind === PREEMPTED || (kind === RUNNING && lane.kind === "core"))
         ) {
@@ -413,7 +417,7 @@ export class Renderer {
     c.fillStyle = this.colors.page;
     const left = Math.max(x, this.labelWidth) + 4;
     const { width: needed } = c.measureText(text);
-    if (left + needed >= x + width - 2) return;
+    if (left + needed >= x + width - 2) return false;
     // Text on a hatched bar stands on a plain one.
     if (plate) {
       c.fillStyle = plate;
@@ -421,6 +425,14 @@ export class Renderer {
       c.fillStyle = this.colors.page;
     }
     c.fillText(text, left, y + height / 2 + 0.5);
+    return true;
+  }
+
+  // The function of a callback stands on its bar where there is room beside the duration.
+  nameCallback(kind, lane, length, ...place) {
+    const text = duration(length);
+    if (kind === 0 && lane.name && this.nameBar(`${lane.name} ${text}`, ...place)) return;
+    this.nameBar(text, ...place);
   }
 
   center(key) {
@@ -546,7 +558,9 @@ export class Renderer {
         c.lineWidth = 2;
         c.strokeRect(x0 - 2.5, y - 2.5, width + 5, full + 5);
       }
-      if (width > 46) this.nameBar(duration(vertex.length), x0, y, width, full);
+      if (width > 46) {
+        this.nameCallback(vertex.kind, lane, vertex.length, x0, y, width, full);
+      }
     }
   }
 

@@ -11,6 +11,7 @@ import {
   count,
   duration,
   EVENT,
+  IDLE_CPU,
   KIND_NAMES,
   KINDS,
   LINKS,
@@ -277,7 +278,7 @@ export class TimelinePage {
       "span",
       { className: "legend-states", hidden: true },
       item("running", "running"),
-      item("preempted", "preempted: another thread has the CPU"),
+      item("preempted", "preempted: lost the CPU while it had more to do"),
       item("runnable", "runnable: waits for a CPU"),
       item("wait", "sleeping"),
       item("uninterruptible", "uninterruptible: page or disk"),
@@ -932,7 +933,10 @@ export class TimelinePage {
   kernelText(hit) {
     const name = this.renderer.names.get(hit.id);
     if (hit.lane.kind === "core") {
-      return hit.kind === RUNNING ? `${name ?? "?"} runs` : `${name ?? "another thread"} took it`;
+      if (hit.kind === RUNNING) return `${name ?? "?"} runs`;
+      return name === IDLE_CPU
+        ? "idle, while a thread is ready"
+        : `${name ?? "another thread"} took it`;
     }
     const woken = hit.kind > PREEMPTED;
     return stateText(KINDS[hit.kind], woken ? wakerName(hit.flags, name) : name);

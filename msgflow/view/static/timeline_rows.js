@@ -1,5 +1,7 @@
 // Rows of the timeline: which there are, in which order, and where they lie on the canvas.
 
+import { shortSymbol } from "./symbols.js";
+
 export const HEIGHTS = { critical: 26, host: 22, process: 20, node: 20, row: 20 };
 
 // Kinds of rows that may be hidden, and what the boxes for that say.
@@ -25,7 +27,7 @@ export function layout(rows, options) {
   const lanes = [];
   let y = 0;
   let [host, process, node] = [null, null, null];
-  let [hostFolded, processFolded, nodeFolded] = [false, false, false];
+  let [hostFolded, processFolded, nodeFolded, isOneNode] = [false, false, false, false];
   let hiddenCount = 0;
   const query = (options.query ?? "").trim().toLowerCase();
   const found = query ? search(rows, query) : null;
@@ -36,6 +38,7 @@ export function layout(rows, options) {
     lanes.push(lane);
   };
   const isPinned = (row) => options.pinned?.has(rows.row_key[row]);
+  const nodes = nodesOf(rows);
   for (let row = 0; row < rows.rows; row++) {
     if (isPinned(row)) {
       push({
@@ -83,10 +86,13 @@ export function layout(rows, options) {
       process = processKey;
       node = null;
       processFolded = options.folded.has(processKey);
+      const [only, ...others] = nodes.get(rows.process_id[row]) ?? [];
+      isOneNode = only !== undefined && others.length === 0;
       push({
         type: "process",
         key: processKey,
-        label: rows.process[row],
+        // What has one node is called by it.
+        label: isOneNode ? `${only} · ${rows.process[row]}` : rows.process[row],
         folded: processFolded,
         row,
       });
@@ -96,7 +102,8 @@ export function layout(rows, options) {
       node = nodeKey;
       nodeFolded = nodeKey !== null && options.folded.has(nodeKey);
       const label = rows.node[row] ?? "node not known";
-      if (nodeKey !== null) push({ type: "node", key: nodeKey, label, folded: nodeFolded, row });
+      const isShown = nodeKey !== null && !(isOneNode && rows.node[row]);
+      if (isShown) push({ type: "node", key: nodeKey, label, folded: nodeFolded, row });
     }
     if (nodeFolded) continue;
     push({
@@ -104,12 +111,25 @@ export function layout(rows, options) {
       key,
       kind,
       label: rows.label[row],
+      // The functions of its callbacks.
+      name: rows.symbol[row] ? shortSymbol(rows.symbol[row]).replace("bound method of ", "") : null,
       isInternal: rows.is_internal[row],
       isBeside: found?.get(row) === "beside",
       row,
     });
   }
   return { lanes, height: y, hiddenCount };
+}
+
+function nodesOf(rows) {
+  const nodes = new Map();
+  for (let row = 0; row < rows.rows; row++) {
+    if (!rows.node[row]) continue;
+    const process = rows.process_id[row];
+    if (!nodes.has(process)) nodes.set(process, new Set());
+    nodes.get(process).add(rows.node[row]);
+  }
+  return nodes;
 }
 
 // Rows with a text, and beside them what exchanges messages with them: rows of the same topic or
@@ -134,7 +154,7 @@ export function search(rows, query) {
 }
 
 export function matches(rows, row, query) {
-  return [rows.label[row], rows.node[row], rows.process[row], rows.host[row], rows.kind[row]]
+  return ["label", "symbol", "node", "process", "host", "kind"].map((name) => rows[name][row])
     .some((text) => text && text.toLowerCase().includes(query));
 }
 
