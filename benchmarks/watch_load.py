@@ -20,7 +20,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from recording.tracetools import build_tracetools
+from recording.tracetools import build_program, build_tracetools
 
 SLOW_SECONDS, SLOW_EVERY = 5, 60
 TARGETS = """
@@ -44,7 +44,8 @@ def main() -> None:
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         directory = Path(name)
-        program = build_program(directory)
+        build_tracetools(directory)
+        program = build_program(Path(__file__).parent / "recording" / "load.c", directory)
         targets = directory / "targets.yaml"
         targets.write_text(TARGETS)
         load = [str(program), str(given.paths), str(given.events), str(round(given.minutes * 60))]
@@ -56,16 +57,6 @@ def main() -> None:
         environment = os.environ | {"LTTNG_UST_REGISTER_TIMEOUT": "-1"}
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as run:
             report(run)
-
-
-def build_program(directory: Path) -> Path:
-    """Compile the program and the library of tracepoints in a directory."""
-    build_tracetools(directory)
-    program = directory / "load"
-    source = Path(__file__).parent / "recording" / "load.c"
-    command = ["gcc", "-O2", "-o", str(program), str(source), f"-L{directory}", "-ltracetools"]
-    subprocess.run(command, check=True)
-    return program
 
 
 def report(run: subprocess.Popen[str]) -> None:

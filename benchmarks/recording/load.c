@@ -4,128 +4,50 @@
  *
  * Each path is a process with three nodes and one thread. A timer publishes, the filter answers, the
  * sink hears it. In the last SLOW_SECONDS of each SLOW_EVERY seconds the filter of path 0 takes
- * 100 ms. It calls the functions of libtracetools.so, as ROS 2 does, and needs nothing else of it.
+ * 100 ms.
  */
 #include <signal.h>
-#include <stdbool.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
+#include "rclcpp.h"
 
 #define EVENTS_OF_FLOW 27
-#define SECOND 1000000000LL
-typedef const void *handle;
 
-void ros_trace_rcl_init(handle context);
-void ros_trace_rcl_node_init(handle node, handle rmw, const char *name, const char *space);
-void ros_trace_rmw_publisher_init(handle rmw, const uint8_t *gid);
-void ros_trace_rcl_publisher_init(handle pub, handle node, handle rmw, const char *topic, int64_t depth);
-void ros_trace_rmw_subscription_init(handle rmw, const uint8_t *gid);
-void ros_trace_rcl_subscription_init(handle sub, handle node, handle rmw, const char *topic, int64_t depth);
-void ros_trace_rclcpp_subscription_init(handle sub, handle subscription);
-void ros_trace_rclcpp_subscription_callback_added(handle subscription, handle callback);
-void ros_trace_rclcpp_callback_register(handle callback, const char *symbol);
-void ros_trace_rcl_timer_init(handle timer, int64_t period);
-void ros_trace_rclcpp_timer_callback_added(handle timer, handle callback);
-void ros_trace_rclcpp_timer_link_node(handle timer, handle node);
-void ros_trace_rclcpp_publish(handle message);
-void ros_trace_rcl_publish(handle pub, handle message);
-void ros_trace_rmw_publish(handle rmw, handle message, int64_t timestamp);
-void ros_trace_rmw_take(handle rmw, handle message, int64_t timestamp, bool taken);
-void ros_trace_rcl_take(handle message);
-void ros_trace_rclcpp_take(handle message);
-void ros_trace_callback_start(handle callback, bool is_intra_process);
-void ros_trace_callback_end(handle callback);
-void ros_trace_rclcpp_executor_wait_for_work(int64_t timeout);
-void ros_trace_rclcpp_executor_get_next_ready(void);
-void ros_trace_rclcpp_executor_execute(handle entity);
-
-/* Handles are addresses: of these fields. */
-static char context, timer, timer_callback, message;
-static struct node { char node, rmw; } source, filter, sink;
-static struct publisher { char pub, rmw; } scan, filtered;
-static struct subscription { char sub, rmw, subscription, callback; } heard, shown;
-
-static int64_t now(clockid_t clock) {
-    struct timespec at;
-    clock_gettime(clock, &at);
-    return at.tv_sec * SECOND + at.tv_nsec;
-}
-
-static void sleep_until(int64_t at) {
-    struct timespec until = {at / SECOND, at % SECOND};
-    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
-}
+static char context;
+static struct node source, filter, sink;
+static struct publisher scan, filtered;
+static struct subscription heard, shown;
+static struct timer timer;
 
 static const char *named(const char *name, int path) {
     static char text[64];
     return snprintf(text, sizeof text, "%s_%d", name, path), text;
 }
 
-static void make_node(struct node *n, const char *name, int path) {
-    ros_trace_rcl_node_init(&n->node, &n->rmw, named(name, path), "/");
-}
-
-static void make_publisher(struct publisher *p, struct node *n, const char *topic, int path) {
-    uint8_t gid[16] = {path, p == &scan};
-    ros_trace_rmw_publisher_init(&p->rmw, gid);
-    ros_trace_rcl_publisher_init(&p->pub, &n->node, &p->rmw, named(topic, path), 10);
-}
-
-static void make_subscription(struct subscription *s, struct node *n, const char *topic, int path) {
-    uint8_t gid[16] = {path, 2 + (s == &heard)};
-    ros_trace_rmw_subscription_init(&s->rmw, gid);
-    ros_trace_rcl_subscription_init(&s->sub, &n->node, &s->rmw, named(topic, path), 10);
-    ros_trace_rclcpp_subscription_init(&s->sub, &s->subscription);
-    ros_trace_rclcpp_subscription_callback_added(&s->subscription, &s->callback);
-    ros_trace_rclcpp_callback_register(&s->callback, "hear");
-}
-
-static void begin(handle entity) {
-    ros_trace_rclcpp_executor_wait_for_work(-1);
-    ros_trace_rclcpp_executor_get_next_ready();
-    ros_trace_rclcpp_executor_execute(entity);
-}
-
-static int64_t publish(struct publisher *p) {
-    int64_t stamp = now(CLOCK_REALTIME);
-    ros_trace_rclcpp_publish(&message);
-    ros_trace_rcl_publish(&p->pub, &message);
-    ros_trace_rmw_publish(&p->rmw, &message, stamp);
-    return stamp;
-}
-
 static void take(struct subscription *s, int64_t stamp) {
-    begin(&s->sub);
-    ros_trace_rmw_take(&s->rmw, &message, stamp, true);
-    ros_trace_rcl_take(&message);
-    ros_trace_rclcpp_take(&message);
-    ros_trace_callback_start(&s->callback, false);
+    ros_trace_rclcpp_executor_wait_for_work(-1);
+    take_and_start_callback(s, stamp);
 }
 
 static void run(int path, int64_t period, int64_t first, int64_t end, int64_t slow, int64_t every) {
     ros_trace_rcl_init(&context);
-    make_node(&source, "source", path);
-    make_node(&filter, "filter", path);
-    make_node(&sink, "sink", path);
-    make_publisher(&scan, &source, "/scan", path);
-    make_publisher(&filtered, &filter, "/filtered", path);
-    make_subscription(&heard, &filter, "/scan", path);
-    make_subscription(&shown, &sink, "/filtered", path);
-    ros_trace_rcl_timer_init(&timer, period);
-    ros_trace_rclcpp_timer_callback_added(&timer, &timer_callback);
-    ros_trace_rclcpp_callback_register(&timer_callback, "tick");
-    ros_trace_rclcpp_timer_link_node(&timer, &source.node);
+    make_node(&source, named("source", path));
+    make_node(&filter, named("filter", path));
+    make_node(&sink, named("sink", path));
+    make_publisher(&scan, &source, named("/scan", path), 2 * path);
+    make_publisher(&filtered, &filter, named("/filtered", path), 2 * path + 1);
+    make_subscription(&heard, &filter, named("/scan", path), "hear", 2 * path);
+    make_subscription(&shown, &sink, named("/filtered", path), "hear", 2 * path + 1);
+    make_timer(&timer, &source, period, "tick");
     for (int64_t due = first; due < end; due += period) {
         sleep_until(due);
-        begin(&timer);
-        ros_trace_callback_start(&timer_callback, false);
+        ros_trace_rclcpp_executor_wait_for_work(-1);
+        start_timer_callback(&timer);
         int64_t stamp = publish(&scan);
-        ros_trace_callback_end(&timer_callback);
+        ros_trace_callback_end(&timer.callback);
         take(&heard, stamp);
         if (path == 0 && every && (due - first) % every >= every - slow) usleep(100000);
         stamp = publish(&filtered);

@@ -20,7 +20,8 @@ from msgflow import trace
 from msgflow.record.daemon import session_daemon
 from msgflow.record.program import PYTHON_NODES
 from msgflow.record.session import Channel, recording_session
-from recording.tracetools import build_tracetools
+from recording.quota import cgroup_with_quota
+from recording.tracetools import build_program, build_tracetools
 
 _NODES = Path(__file__).with_name("nodes.py")
 # Those who hear go last. Seconds.
@@ -33,6 +34,8 @@ _LATE = {"late"}
 _UNTRACED = {"mixed": {"filter"}}
 _UNTIL_LATE = 2.0
 _LAUNCH = _NODES.parents[1] / "robot" / "launch.py"
+QUOTA = "quota"
+"""A problem of a robot: one of its processes has a quota of CPU time."""
 
 
 class NotPossibleError(Exception):
@@ -140,9 +143,15 @@ def record(
 
 
 def record_launched(
-    python: Path, robot: str, problems: Sequence[str], seconds: float, directory: Path
+    python: Path,
+    robot: str,
+    problems: Sequence[str],
+    seconds: float,
+    directory: Path,
+    *,
+    with_kernel: bool,
 ) -> Path:
-    """Record a robot of `robot/launch.py` with `msgflow record --kernel`, as a user does.
+    """Record a robot of `robot/launch.py` with `msgflow record`, as a user does.
 
     Args:
         python: of the environment with rclpy.
@@ -150,24 +159,35 @@ def record_launched(
         problems: that are planted.
         seconds: for how long it runs once all its processes do.
         directory: a directory to write to.
+        with_kernel: record the events of the kernel, too.
 
     Returns:
-        The directory of the recording: `ust`, and the events of the kernel beside it.
+        The directory of the recording: `ust`, and what else is recorded beside it.
 
     Raises:
         NotPossibleError: see `require`.
+        OSError: a cgroup with a quota cannot be made.
         subprocess.SubprocessError: the recording failed, or the robot did not start; `record.log`
             says why.
     """
     require(python)
     library = build_tracetools(_made(directory / "library"))
+    if (source := _LAUNCH.with_name(f"{robot}.c")).exists():
+        build_program(source, library.parent)
     ready = directory / "ready"
     recorded = directory / "trace"
     # Python of msgflow has no use for it.
     launched = ("env", f"LD_PRELOAD={library}", python, _LAUNCH, robot, ready, seconds, *problems)
-    options = ("--name", directory.name, "-o", recorded, "--kernel", "--no-ingest")
+    options = ["--name", directory.name, "-o", recorded, "--no-ingest"]
+    if with_kernel:
+        options.append("--kernel")
     command = [str(word) for word in (sys.executable, "-m", "msgflow", "record", *options)]
-    with one_at_a_time(), (directory / "record.log").open("w") as log:
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(one_at_a_time())
+        log = stack.enter_context((directory / "record.log").open("w"))
+        if QUOTA in problems:
+            group = stack.enter_context(cgroup_with_quota())
+            (directory / "group").symlink_to(group)
         recording = subprocess.Popen(
             [*command, "--", *(str(word) for word in launched)],
             env=ros_environment(python),

@@ -76,6 +76,14 @@ def build_tracetools(directory: Path) -> Path:
     return library
 
 
+def build_program(source: Path, directory: Path) -> Path:
+    """Compile a program of C that calls the tracepoints, beside their library."""
+    program = directory / source.stem
+    command = ["gcc", "-O2", "-pthread", "-o", str(program), str(source), f"-L{directory}"]
+    subprocess.run([*command, "-ltracetools"], check=True)
+    return program
+
+
 def parameters() -> dict[str, list[str]]:
     """Return the parameters of the functions, type and name, by the tracepoint's name."""
     return {

@@ -26,10 +26,13 @@ class Kind(StrEnum):
     PROCESS_THREAD = "process_thread"
     GARBAGE_COLLECTION = "garbage_collection"
     NO_CPU = "no_cpu"
+    LOCK = "lock"
+    DISK = "disk"
     RESTART = "restart"
     NEVER_MATCHED = "never_matched"
     LATE_START = "late_start"
     RECORDING = "recording"
+    CALLBACK = "callback"
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,8 @@ class Culprit:
         callback: as in `Timer(250 ms)`; None: any, or none.
         function: the last name of its symbol; None: likewise.
         names: what headline and evidence have to name besides.
-        sufferer: whom it has to name instead, with a number, where nothing but a trace of the
-            kernel tells the kind; None: `why` knows it without one.
+        sufferer: whom it has to name instead, with a number, where the kind is not known without
+            CPU time; None: `why` knows it all the same.
     """
 
     kinds: tuple[Kind, ...]
@@ -84,13 +87,14 @@ class Told:
     evidence: tuple[str, ...]
 
 
-# Kinds of `why` that are finer than what is planted. Without the kernel's events a callback takes
-# long, and no more is known.
+# What is only known of a callback that takes long where it is known what its thread did.
+_OF_CALLBACKS = {
+    Kind.COMPUTES, Kind.SLEEPS, Kind.LOCK, Kind.DISK, Kind.GARBAGE_COLLECTION,
+}  # fmt: skip
+# Kinds of `why` that are finer than what is planted.
 _KINDS = {
-    "callback": Kind.COMPUTES,
+    "interpreter": Kind.PROCESS_THREAD,
     "service": Kind.AWAITS,
-    "lock": Kind.SLEEPS,
-    "disk": Kind.SLEEPS,
     "waits": Kind.QUEUE,
 }
 
@@ -112,9 +116,12 @@ def told(verdict: Sequence[Mapping[str, Any]]) -> list[Told]:
 
 
 def missed(
-    planted: Sequence[Culprit], verdict: Sequence[Told], *, has_kernel: bool
+    planted: Sequence[Culprit], verdict: Sequence[Told], *, knows_cpu: bool
 ) -> Iterator[str]:
-    """Yield what a verdict does not say of the culprits at their places, the worst first."""
+    """Yield what a verdict does not say of the culprits at their places, the worst first.
+
+    `knows_cpu`: events of the kernel, or CPU times and samples, tell what threads did.
+    """
     accused = [row for row in verdict if row.has_harm]
     if not planted:
         if accused:
@@ -123,15 +130,15 @@ def missed(
             yield f"no headline says that {NOTHING}"
     for place, culprit in enumerate(planted):
         if place < len(accused):
-            for fault in faults(culprit, accused[place], has_kernel=has_kernel):
+            for fault in faults(culprit, accused[place], knows_cpu=knows_cpu):
                 yield f"headline {place + 1}: {fault}"
         else:
             yield f"no headline {place + 1} of {culprit.who}"
 
 
-def faults(culprit: Culprit, row: Told, *, has_kernel: bool) -> Iterator[str]:
+def faults(culprit: Culprit, row: Told, *, knows_cpu: bool) -> Iterator[str]:
     """Yield what is wrong or missing in what is said of a culprit."""
-    is_guess = not has_kernel and culprit.sufferer is not None
+    is_guess = not knows_cpu and culprit.sufferer is not None
     who = culprit.who if not is_guess else f"{culprit.who}|{culprit.sufferer}"
     if not _is(who, row.who):
         yield f"{row.who} is blamed, not {who}"
@@ -144,9 +151,9 @@ def faults(culprit: Culprit, row: Told, *, has_kernel: bool) -> Iterator[str]:
     if is_guess:
         return
     kinds = set(culprit.kinds)
-    if Kind.SLEEPS in kinds and not has_kernel:
-        # Only the kernel tells one from the other.
-        kinds.add(Kind.COMPUTES)
+    if not knows_cpu and kinds & _OF_CALLBACKS:
+        # It takes long, and no more is known.
+        kinds.add(Kind.CALLBACK)
     if row.kind not in kinds:
         yield f"the kind is {row.kind}, not {' or '.join(culprit.kinds)}"
     function = culprit.function

@@ -3,7 +3,8 @@
     python launch.py ROBOT READY SECONDS [PROBLEM]…
 
 It makes the file READY when all nodes spin. SECONDS is how long they will run from then on: what is
-planted to happen half-way does so then. Needs no package of msgflow.
+planted to happen half-way does so then. A robot that is no file of Python beside this one is
+the program library/ROBOT of the current directory. Needs no package of msgflow.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pathlib import Path
 _HERE = Path(__file__).resolve().parent
 _GONE_SECONDS = 2
 _LATE_SECONDS = 4
+_GROUP = Path("group")
 
 
 @dataclass(frozen=True)
@@ -29,12 +31,16 @@ class Robot:
         processes: those who hear come first.
         restarted: the process that is killed half-way, and started again.
         late: the process that is started after the others.
-        hogs: how `hog.py` is called, one for each.
+        limited: the process in the cgroup that the directory `group` is, if there is one.
+        hog: the file of the program that takes the CPU.
+        hogs: how it is called, one for each.
     """
 
     processes: tuple[str, ...]
     restarted: str = ""
     late: str = ""
+    limited: str = ""
+    hog: str = "hog.py"
     hogs: tuple[tuple[str, ...], ...] = ((),) * (1 + (os.cpu_count() or 1))
 
 
@@ -55,6 +61,8 @@ ROBOTS = {
          "front"),
         restarted="tracker",
     ),
+    "worker": Robot(("sink", "worker", "sensor"), limited="worker", hog="train.py"),
+    "c_worker": Robot(("sink", "worker", "sensor"), limited="worker", hog="train.py"),
 }  # fmt: skip
 
 
@@ -62,10 +70,14 @@ def main() -> None:
     """Start all processes, then what is planted beside them."""
     name, ready, seconds, *problems = sys.argv[1:]
     robot = ROBOTS[name]
+    file = _HERE / f"{name}.py"
+    program = [sys.executable, str(file)] if file.exists() else [f"library/{name}"]
 
     def start(process: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, str(_HERE / f"{name}.py"), process, *problems]
-        return subprocess.Popen(command, stdout=subprocess.PIPE)
+        started = subprocess.Popen([*program, process, *problems], stdout=subprocess.PIPE)
+        if process == robot.limited and _GROUP.exists():
+            (_GROUP / "cgroup.procs").write_text(str(started.pid))
+        return started
 
     late = robot.late if "late" in problems else ""
     running = {process: start(process) for process in robot.processes if process != late}
@@ -73,8 +85,10 @@ def main() -> None:
         process.stdout.readline()
     Path(ready).touch()
     if "hog" in problems:
+        # They have no library with tracepoints.
+        environment = {name: value for name, value in os.environ.items() if name != "LD_PRELOAD"}
         for words in robot.hogs:
-            subprocess.Popen([sys.executable, str(_HERE / "hog.py"), *words])
+            subprocess.Popen([sys.executable, str(_HERE / robot.hog), *words], env=environment)
     if late:
         time.sleep(_LATE_SECONDS)
         start(late)

@@ -6,6 +6,8 @@ things longer.
 
 from __future__ import annotations
 
+from functools import partial
+
 from robot.judge import Culprit, Kind, Limits
 
 
@@ -58,9 +60,8 @@ DRONE = {
         r"Subscription\(/odom\)|Service\(/map/query\)", "on_odom|on_query",
         names=("/planner", "/map_server|/map/query"),
     ),
-    # No event tells of a collection: it computes.
     "gc": Culprit(
-        (Kind.GARBAGE_COLLECTION, Kind.COMPUTES), "/estimator", (_ms(50, 3_000),),
+        (Kind.GARBAGE_COLLECTION,), "/estimator", (_ms(50, 3_000),),
         r"Subscription\(/imu\)", "on_imu",
     ),
     "gil": Culprit(
@@ -88,12 +89,12 @@ PICKER = {
         r"Subscription\((/obstacles|/pose)\)", "on_obstacles|on_pose",
     ),
     "lock": Culprit(
-        (Kind.SLEEPS,), "/fusion", (_ms(60, 200),),
+        (Kind.LOCK,), "/fusion", (_ms(60, 200),),
         r"Subscription\((/scan|/joint_states)\)", "on_scan|on_joints",
         names=("/joint_states|on_joints", "/scan|on_scan"), sufferer="/fusion",
     ),
     "disk": Culprit(
-        (Kind.SLEEPS,), "/arm_control", (_ms(20, 500),),
+        (Kind.DISK, Kind.SLEEPS), "/arm_control", (_ms(20, 500),),
         r"Subscription\(/pose\)", "on_pose", sufferer="/arm_control",
     ),
     "burst": Culprit((Kind.BURST,), "/lidar", (_count(19, 21),)),
@@ -124,12 +125,12 @@ VEHICLE = {
         names=("/behavior", "/router|/route"),
     ),
     "lock": Culprit(
-        (Kind.SLEEPS,), "/merger", (_ms(45, 150),),
+        (Kind.LOCK,), "/merger", (_ms(45, 150),),
         r"Subscription\(/(front|rear)/points\)", "on_front|on_rear",
         names=("/front/points|on_front", "/rear/points|on_rear"), sufferer="/merger",
     ),
     "disk": Culprit(
-        (Kind.SLEEPS,), "/wheels", (_ms(20, 500),),
+        (Kind.DISK, Kind.SLEEPS), "/wheels", (_ms(20, 500),),
         r"Subscription\(/steering\)", "on_steering", sufferer="/wheels",
     ),
     # A thread without callbacks sends.
@@ -142,7 +143,7 @@ VEHICLE = {
         (Kind.ACTION,), "/maneuver", (_ms(530, 700),), r".*/park.*", "execute_park"
     ),
     "gc": Culprit(
-        (Kind.GARBAGE_COLLECTION, Kind.COMPUTES), "/tracker", (_ms(50, 3_000),),
+        (Kind.GARBAGE_COLLECTION,), "/tracker", (_ms(50, 3_000),),
         r"Subscription\(/cloud\)", "on_cloud",
     ),
     "gil": Culprit(
@@ -158,7 +159,31 @@ VEHICLE = {
         names=("/cloud", "/tracker"),
     ),
 }  # fmt: skip
-ROBOTS = {"robot": ROBOT, "drone": DRONE, "picker": PICKER, "vehicle": VEHICLE}
+_of_worker = partial(
+    Culprit, who="/worker", callback=r"Subscription\(/scan\)", function="on_scan|Worker::on_scan"
+)
+# As long as it works; what keeps it from the CPU makes that longer.
+_WORK_TIME = (_ms(17, 40),)
+WORKER = {
+    "computes": _of_worker((Kind.COMPUTES,), limits=_WORK_TIME),
+    "sleeps": _of_worker((Kind.SLEEPS,), limits=_WORK_TIME),
+    "lock": _of_worker((Kind.LOCK,), limits=_WORK_TIME, names=("on_image",)),
+    "disk": _of_worker((Kind.DISK,), limits=(_ms(17, 120),)),
+    "hog": Culprit(
+        (Kind.NO_CPU,), r".*train\.py.*|/worker", (_ms(40, 5_000),), names=(r"train\.py",)
+    ),
+    "quota": Culprit(
+        (Kind.NO_CPU,), "/worker", (_ms(15, 300),), names=("msgflow-planted", "0.3 CPU")
+    ),
+}
+ROBOTS = {
+    "robot": ROBOT,
+    "drone": DRONE,
+    "picker": PICKER,
+    "vehicle": VEHICLE,
+    "worker": WORKER,
+    "c_worker": WORKER,
+}
 """By the name of a robot."""
 
 # Two at once, the worse one first.
@@ -175,4 +200,6 @@ PAIRS = {
     "drone": (("service", "sometimes"), ("restart", "timer")),
     "picker": (("action", "lock"), ("over", "depth1")),
     "vehicle": (("action", "sometimes"),),
+    "worker": (),
+    "c_worker": (),
 }

@@ -278,7 +278,7 @@ def _picker(built: _Twin, problem: str | None) -> None:
     if problem == "lock":
         looks = _work(locked_ns)
         built.blame(
-            [Kind.SLEEPS], fusion, _about(locked_ns, 0.8, 2.5), names=(states, scan),
+            [Kind.LOCK, Kind.SLEEPS], fusion, _about(locked_ns, 0.8, 2.5), names=(states, scan),
             sufferer=fusion,
         )  # fmt: skip
     fuses = Node(
@@ -303,7 +303,7 @@ def _picker(built: _Twin, problem: str | None) -> None:
     elif problem == "disk":
         guards = replace(guards, page_fault_ns=disk_ns)
         built.blame(
-            [Kind.SLEEPS], safety, _about(disk_ns, 0.7, 1.6),
+            [Kind.DISK, Kind.SLEEPS], safety, _about(disk_ns, 0.7, 1.6),
             callback=f"Subscription({obstacles})", sufferer=safety,
         )  # fmt: skip
     guard = Node(

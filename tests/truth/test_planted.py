@@ -41,7 +41,7 @@ def test_it_names_each_of_seven_problems_at_once(tmp_path: Path, with_kernel: bo
     why = explained(tmp_path, ROBOT, 7, with_kernel=with_kernel)
     rows: list[Told] = told(why.verdict.table.to_pylist())
     for name, culprit in ROBOT.items():
-        each = [list(faults(lenient(culprit), row, has_kernel=with_kernel)) for row in rows]
+        each = [list(faults(lenient(culprit), row, knows_cpu=with_kernel)) for row in rows]
         assert [] in each, (name, each, rows)
     verdict = why.verdict.table.to_pylist()
     harm = [row["harm_ns"] for row in verdict if row["kind"] != "late_start"]
@@ -51,13 +51,13 @@ def test_it_names_each_of_seven_problems_at_once(tmp_path: Path, with_kernel: bo
     pieces = why.slow_flow.table.to_pylist()
     assert pieces[-1]["activity"] == "rest"
     assert sum(piece["duration_ns"] for piece in pieces) == pieces[0]["latency_ns"]
-    kernel = "msgflow record --kernel shows what had the CPU"
+    kernel = "msgflow record shows which callbacks compute, sleep, or have no CPU"
     assert (kernel in why.notes) is not with_kernel
 
 
 def test_nothing_stands_out_where_nothing_was_planted(tmp_path: Path) -> None:
     why = explained(tmp_path, (), 3)
     verdict = why.verdict.table.to_pylist()
-    assert list(missed((), told(verdict), has_kernel=True)) == []
+    assert list(missed((), told(verdict), knows_cpu=True)) == []
     assert len(verdict) == 1
     assert not len(why.losses)
