@@ -79,7 +79,7 @@
 -- column: busy_max_ns BIGINT [ns]  Executor busy with other callbacks from earliest_ns on
 -- column: busy_min_ns BIGINT [ns]  Executor busy with other callbacks from latest_ns on
 -- column: by_kind VARCHAR  What took the CPU, or ended the sleep: 'thread', 'timer', 'interrupt' or
---     'softirq'. NULL: not known, or the state needs none
+--     'softirq'; 'idle CPU': nothing took it. NULL: not known, or the state needs none
 -- column: by_other_thread_id BIGINT  Thread of another process that took the CPU, or ended the
 --     sleep
 -- column: by_priority INTEGER  Priority of the thread that took the CPU; NULL: not known
@@ -165,7 +165,7 @@
 -- column: period_median_ns BIGINT [ns]  Median time from one start to the next
 -- column: pid INTEGER  Process id
 -- column: position BIGINT  Order within the flow, from 1
--- column: preempted_ns BIGINT [ns]  Likewise, another thread had the CPU that its thread had lost
+-- column: preempted_ns BIGINT [ns]  Likewise, its thread had more to do, but had lost the CPU
 -- column: priority INTEGER  Its priority, as the kernel has it: 0 to 99 real-time, 100 to 139 nice
 --     -20 to 19
 -- column: process VARCHAR  Process name

@@ -1,7 +1,7 @@
 -- description: What the rows of a query would come from, and was not recorded: a sentence each. The
 --     note of its header names it. Other events of a run may show that it has no requests or goals.
 -- grain: one row per sentence
--- param: note VARCHAR  'requests', 'goals', 'kernel', 'samples' or 'callbacks'
+-- param: note VARCHAR  'requests', 'goals', 'kernel', 'samples', 'usage' or 'callbacks'
 WITH lacking AS (
     SELECT
         f.run_id,
@@ -20,6 +20,10 @@ WITH lacking AS (
     SELECT 0, 'no functions were sampled: msgflow record --profile 99, see docs/functions.md'
     WHERE $note = 'samples'
         AND NOT EXISTS (FROM main.stack_sample WHERE list_contains($runs, run_id))
+    UNION ALL
+    SELECT 0, 'the system was not sampled: msgflow record does, see docs/record.md'
+    WHERE $note = 'usage'
+        AND NOT EXISTS (FROM main.host_usage WHERE list_contains($runs, run_id))
     UNION ALL
     SELECT
         0,

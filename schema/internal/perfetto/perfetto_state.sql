@@ -3,8 +3,8 @@
 -- grain: one row per state of a thread, and per stretch in which a thread ran on a core
 WITH state AS MATERIALIZED (
     SELECT
-        s.thread_id, s.state, s.start_ns, s.end_ns, s.cpu, s.priority, s.waker_kind, p.host_id,
-        h.hostname,
+        s.thread_id, s.state, s.start_ns, s.end_ns, s.cpu, s.priority, s.is_cpu_idle, s.waker_kind,
+        p.host_id, h.hostname,
         printf('%s %d', l.label, t.tid) AS thread,
         printf('%s %d', coalesce(bl.label, o.name, '?'), coalesce(b.tid, o.tid)) AS other
     FROM main.thread_state AS s
@@ -24,7 +24,11 @@ SELECT
     thread_id,
     'kernel' AS track,
     'schedule' AS category,
-    CASE WHEN state = 'preempted' THEN concat_ws(' by ', state, other) ELSE state END AS name,
+    CASE
+        WHEN is_cpu_idle THEN 'preempted, CPU idle'
+        WHEN state = 'preempted' THEN concat_ws(' by ', state, other)
+        ELSE state
+    END AS name,
     start_ns, end_ns, cpu, priority,
     CASE WHEN waker_kind = 'thread' THEN other ELSE waker_kind END AS woken_by
 FROM state

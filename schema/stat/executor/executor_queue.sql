@@ -55,13 +55,15 @@ summed AS (
 preemptor AS (
     SELECT
         o.thread_id, o.number, p.start_ns, p.end_ns,
-        coalesce(t.name, x.name) AS name
+        p.preemptor_thread_id IS NULL AND p.preemptor_other_thread_id IS NULL AS is_idle,
+        CASE WHEN is_idle THEN 'idle CPU' ELSE coalesce(t.name, x.program) END AS name
     FROM store.preemptor AS p
     ASOF JOIN outside AS o ON p.thread_id = o.thread_id AND p.start_ns >= o.start_ns
     LEFT JOIN store.thread AS t ON p.preemptor_thread_id = t.thread_id
     LEFT JOIN store.other_thread AS x ON p.preemptor_other_thread_id = x.other_thread_id
-    -- An idle CPU is not taken.
-    WHERE p.start_ns < o.end_ns AND coalesce(x.tid <> 0, true)
+    -- A CPU that is idle for less begins to run the thread (main.withheld_cpu).
+    WHERE p.start_ns < o.end_ns
+        AND (NOT is_idle OR p.end_ns - p.start_ns >= 1_000_000)
 ),
 named AS (
     SELECT
