@@ -24,6 +24,8 @@ _OVER = Limits("%", 90, 160)
 # What delays a callback without being in it.
 _ANY = _ms(8, 3_000)
 _NODE = r"/.+"
+# By the kernel its thread has a name, by samples its process a command.
+_HOG = r"compressor|hog\.py"
 
 # It sleeps with rclpy, and computes in the simulator.
 _WORK = (Kind.COMPUTES, Kind.SLEEPS)
@@ -39,7 +41,7 @@ ROBOT = {
         (_ms(50, 100), _count(20, 120), _OVER), r"Subscription\(/image\)",
     ),
     "hog": Culprit(
-        (Kind.NO_CPU,), r"compressor.*|/localizer", (_ms(45, 110),), names=("compressor",),
+        (Kind.NO_CPU,), r"compressor.*|/localizer", (_ms(45, 110),), names=(_HOG,),
         sufferer="/localizer",
     ),
     "late": Culprit((Kind.LATE_START,), "/planner", (_ms(3_000, 6_000),)),
@@ -69,7 +71,7 @@ DRONE = {
         r"Subscription\(/camera/rect\)", "on_image", sufferer="/visual_odometry",
     ),
     "hog": Culprit(
-        (Kind.NO_CPU,), rf"compressor.*|{_NODE}", (_ANY,), names=("compressor",), sufferer=_NODE
+        (Kind.NO_CPU,), rf"compressor.*|{_NODE}", (_ANY,), names=(_HOG,), sufferer=_NODE
     ),
     "restart": Culprit(
         (Kind.RESTART,), "/visual_odometry", (_ms(1_500, 15_000), _count(15, 80))
@@ -151,7 +153,7 @@ VEHICLE = {
         r"Subscription\(/cloud\)", "on_cloud", sufferer="/tracker",
     ),
     "hog": Culprit(
-        (Kind.NO_CPU,), rf"compressor.*|{_NODE}", (_ANY,), names=("compressor",), sufferer=_NODE
+        (Kind.NO_CPU,), rf"compressor.*|{_NODE}", (_ANY,), names=(_HOG,), sufferer=_NODE
     ),
     "restart": Culprit((Kind.RESTART,), "/tracker", (_ms(1_500, 15_000), _count(20, 110))),
     "qos": Culprit(

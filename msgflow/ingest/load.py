@@ -172,7 +172,10 @@ def _placed(
                     if corrected.num_rows:
                         events.append((kind, corrected))
         placed += cpus.place(of_cpus) if of_cpus else []
-        placed += sequences.place(events) if events else []
+        read = [pair for pair in events if pair[0] is READING]
+        others = [pair for pair in events if pair[0] is not READING]
+        placed += sequences.place(others) if others else []
+        placed += sequences.place_readings(read) if read else []
         yield placed
 
 

@@ -49,13 +49,15 @@ def with_counters(
 def of_readings_alone(traces: Sequence[TraceInfo]) -> frozenset[int]:
     """Return the indices of traces that only read counters: their events are in other traces."""
     # A process that may not read its counters declares these events without any.
-    found = {
-        trace.index
-        for trace in traces
-        if set(trace.event_names) == _EVENTS
-        or (trace.counters and _EVENTS.issuperset(trace.event_names))
-    }
-    return frozenset(found) if len(found) < len(traces) else frozenset()
+    few = [trace for trace in traces if trace.event_names and _EVENTS.issuperset(trace.event_names)]
+    rest = {_session(trace) for trace in traces if not _EVENTS.issuperset(trace.event_names)}
+    read = {_session(trace) for trace in few if trace.counters}
+    return frozenset(trace.index for trace in few if _session(trace) in rest & read)
+
+
+def _session(trace: TraceInfo) -> tuple[object, ...]:
+    """Return what sessions of one machine have in common, and its kernel trace has not."""
+    return trace.hostname, trace.clock_uuid, trace.domain
 
 
 def readings(event: str, batch: pa.RecordBatch) -> Iterator[pa.RecordBatch]:

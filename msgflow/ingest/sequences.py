@@ -94,6 +94,19 @@ class Sequences:
             *_cpu_returns(batches, groups, events),
         ]
 
+    def place_readings(self, batches: Sequence[tuple[Tracepoint, pa.RecordBatch]]) -> list[Rows]:
+        """Return (table, rows) of readings, with their threads; they begin and end no thread."""
+        known = self._threads.count
+        threads = self._threads.of(batches)
+        ends = np.cumsum([0, *(batch.num_rows for _, batch in batches)])
+        placed: list[Rows] = []
+        for (tracepoint, batch), begin, end in zip(batches, ends[:-1], ends[1:], strict=True):
+            columns = {column: batch[column] for column in _LEADING}
+            columns["thread_index"] = to_arrow(threads[begin:end])
+            columns |= {field: batch[field] for field in batch.schema.names[_CONTEXTS:]}
+            placed.append((tracepoint.table, pa.RecordBatch.from_pydict(columns)))
+        return [*placed, *_new_threads(batches, threads, known)]
+
 
 class _Threads:
     """Numbers of threads, that is of (host, PID namespace, pid, tid), in order of appearance."""

@@ -36,7 +36,8 @@ def load_system_samples(
         for lines in read_system_samples(file, damages):
             interrupts.check()
             # The first line has the name of the machine.
-            hostname = hostname or lines[0].split("\t")[1]
+            if not count:
+                hostname = hostname or lines[0].split("\t")[1]
             numbers = range(count, count + len(lines))
             rows = {
                 "file": pa.array([place] * len(lines), pa.int32()),

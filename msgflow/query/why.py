@@ -37,7 +37,10 @@ if TYPE_CHECKING:
 # The query whose paths are explained.
 _FIRST = "e2e-latency"
 # By what a culprit lacks: how to know what is not known of it.
-_SHOWS_CPU = "msgflow record shows which callbacks compute, sleep, or have no CPU"
+_SHOWS_CPU = (
+    "msgflow record shows which callbacks compute, sleep, or have no CPU; where it may not read"
+    " clocks, msgflow record --kernel does"
+)
 _RECORDED_BY = {
     "cpu": _SHOWS_CPU,
     "samples": _SHOWS_CPU,

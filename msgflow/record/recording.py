@@ -61,7 +61,7 @@ class Status:
     seconds: float  # since it began
     # Bytes of all events on the disk, without the clocks of threads; others are still in buffers.
     event_bytes: int
-    # Events for which the buffers were too small; 0 where events are left out, of which LTTng tells
+    # Events for which the buffers were too small; 0 where events are left out, since LTTng says
     # nothing before the end.
     discarded: int
     free_bytes: int  # of the disk

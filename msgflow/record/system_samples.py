@@ -23,13 +23,18 @@ def sampled(directory: Path, note: Callable[[str], None]) -> Iterator[None]:
     """
     with tempfile.TemporaryFile("w+") as words:
         # It needs no packages. A group of its own: Ctrl-C of the terminal is not for it.
-        child = subprocess.Popen(
-            [sys.executable, "-I", "-S", sampler.__file__, str(directory / SYSTEM_SAMPLES)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=words,
-            start_new_session=True,
-        )
+        try:
+            child = subprocess.Popen(
+                [sys.executable, "-I", "-S", sampler.__file__, str(directory / SYSTEM_SAMPLES)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=words,
+                start_new_session=True,
+            )
+        except OSError as error:
+            note(f"the system is not sampled: {(error.strerror or str(error)).lower()}")
+            yield
+            return
         try:
             yield
         finally:

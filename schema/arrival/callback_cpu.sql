@@ -29,4 +29,4 @@ WITH known AS (
 SELECT callback_instance_id, cpu_ns, cpu_source
 FROM known
 WHERE cpu_ns IS NOT NULL
-QUALIFY row_number() OVER (PARTITION BY callback_instance_id ORDER BY place) = 1
+QUALIFY row_number() OVER (PARTITION BY callback_instance_id ORDER BY place, cpu_ns) = 1

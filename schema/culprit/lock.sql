@@ -11,7 +11,7 @@ SELECT
     c.p95_ns, c.lost, c.published,
     w.sleep_ns AS run_ns,
     w.other_node AS other,
-    w.other_callback, w.other_function,
+    w.other_callback, w.other_function, w.is_supposed,
     c.claims || [w.other_node || w.other_callback, w.other_node || ' waits'] AS claims
 FROM long_callback AS c
 JOIN callback_wake AS w ON c.node = w.node AND c.callback = w.callback

@@ -15,10 +15,11 @@ SELECT
     max(w.p95_ns) AS p95_ns,
     arg_max_null(w.lost, w.mean_ns) AS lost,
     arg_max_null(w.published, w.mean_ns) AS published,
-    any_value(CASE WHEN q.node IS NULL AND p.reason IS NULL THEN p.program END) AS other,
+    any_value(CASE WHEN q.node IS NULL AND p.reason IS NULL
+        AND coalesce(p.used_cpus > l.of_callback, true) THEN p.program END) AS other,
     any_value(CASE WHEN q.node IS NULL THEN p.reason END) AS reason,
     any_value(CASE WHEN q.node IS NULL THEN p.used_cpus END) AS used_cpus,
-    any_value(coalesce(q.cpus, p.cpus)) AS cpus,
+    any_value(CASE WHEN q.node IS NULL THEN p.cpus ELSE q.cpus END) AS cpus,
     any_value(q.quota) AS quota,
     any_value(q.throttled_count) AS count,
     any_value(q.throttled_ns) AS throttled_ns,
@@ -47,7 +48,18 @@ JOIN application_path AS a ON w.path = a.path
 LEFT JOIN callback_use AS u ON w.node = u.node AND w.callback = u.callback
 CROSS JOIN noticed AS l
 LEFT JOIN cpu_user AS p ON w.node = p.node
-LEFT JOIN cpu_quota AS q ON w.node = q.node AND q.throttled_count >= l.lost
+LEFT JOIN (
+    SELECT
+        node,
+        sum(waiting_ns) AS waiting_ns
+    FROM callback_cpu
+    GROUP BY node
+) AS c
+    ON w.node = c.node
+LEFT JOIN cpu_quota AS q
+    ON w.node = q.node
+    AND q.throttled_count >= l.lost
+    AND q.throttled_ns >= l.of_callback * coalesce(c.waiting_ns, 0)
 GROUP BY w.node, w.path
 HAVING sum(w.mean_ns) >= any_value(l.least_ns)
     AND max(w.p95_ns) >= min(greatest(coalesce(u.limit_ns, l.late_ns), l.of_path * a.p95_ns))

@@ -69,7 +69,7 @@ def said(report: IngestReport) -> list[str]:
 
 
 def test_samples_beside_a_trace_are_read(session: Path, text: bytes, new_database: Path) -> None:
-    (session / FILE).write_bytes(gzip.compress(text))
+    (session / FILE).write_bytes(gzip.compress(text, mtime=0))
     report = ingest([session], new_database)
     assert said(report) == []
     count = text.count(b"thread\t")
@@ -78,7 +78,7 @@ def test_samples_beside_a_trace_are_read(session: Path, text: bytes, new_databas
 
 
 def test_samples_in_an_archive_are_read(session: Path, text: bytes, new_database: Path) -> None:
-    (session / FILE).write_bytes(gzip.compress(text))
+    (session / FILE).write_bytes(gzip.compress(text, mtime=0))
     archive = shutil.make_archive(str(session), "tar", session)
     ingest([archive], new_database)
     count = text.count(b"thread\t")
@@ -93,7 +93,7 @@ def test_each_host_has_its_samples(other_trace: Path, new_database: Path, tmp_pa
     count = 0
     for host in (pair / "alpha", pair / "beta"):
         text = text_of(host, tmp_path / "before.duckdb")
-        (host / FILE).write_bytes(gzip.compress(text))
+        (host / FILE).write_bytes(gzip.compress(text, mtime=0))
         count += text.count(b"thread\t")
     report = ingest([pair], new_database, hosts={"robot": pair / "alpha"})
     assert said(report) == []
@@ -101,7 +101,7 @@ def test_each_host_has_its_samples(other_trace: Path, new_database: Path, tmp_pa
 
 
 def test_samples_alone_are_no_recording(tmp_path: Path, new_database: Path) -> None:
-    (tmp_path / FILE).write_bytes(gzip.compress(HEAD))
+    (tmp_path / FILE).write_bytes(gzip.compress(HEAD, mtime=0))
     with pytest.raises(TraceError, match="no CTF trace \\(no file `metadata`\\) in this directory"):
         ingest([tmp_path], new_database)
 
@@ -110,10 +110,10 @@ def test_samples_alone_are_no_recording(tmp_path: Path, new_database: Path) -> N
     ("content", "reason"),
     [
         (b"", "it ends early"),
-        (gzip.compress(b"")[:5], "it ends early"),
+        (gzip.compress(b"", mtime=0)[:5], "it ends early"),
         (b"not packed at all", "it is damaged behind its first 0 lines"),
-        (gzip.compress(b"a table\nof somebody else\n"), "it has no samples of the system"),
-        (gzip.compress(b"msgflow usage 2\tx\n"), "or those of a later msgflow"),
+        (gzip.compress(b"a table\nof somebody else\n", mtime=0), "it has no samples of the system"),
+        (gzip.compress(b"msgflow usage 2\tx\n", mtime=0), "or those of a later msgflow"),
     ],
 )
 def test_what_cannot_be_read_is_a_finding_and_the_run_is_stored(
@@ -153,7 +153,9 @@ def test_samples_of_another_boot_are_left_out(
 def test_files_have_bounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """On lines, and on the length of each: a small file may unpack to any size."""
     long = b"a" * 5000
-    (tmp_path / FILE).write_bytes(gzip.compress(HEAD + long * 1000 + b"\nb\n" + long + b"\nc\0d\n"))
+    (tmp_path / FILE).write_bytes(
+        gzip.compress(HEAD + long * 1000 + b"\nb\n" + long + b"\nc\0d\n", mtime=0)
+    )
     damages: list[str] = []
     assert list(read_system_samples(tmp_path / FILE, damages)) == [
         [HEAD.decode().strip()],
@@ -162,7 +164,7 @@ def test_files_have_bounds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert damages == ["2 of its lines are too long, and left out"]
     monkeypatch.setattr(system_samples, "_MOST_LINES", 3)
     monkeypatch.setattr(system_samples, "_MOST_AT_ONCE", 30)
-    (tmp_path / FILE).write_bytes(gzip.compress(HEAD + b"\n" * 1000))
+    (tmp_path / FILE).write_bytes(gzip.compress(HEAD + b"\n" * 1000, mtime=0))
     damages.clear()
     assert sum(map(len, read_system_samples(tmp_path / FILE, damages))) <= 3
     assert damages == ["only the first 3 of its lines are used"]
@@ -183,7 +185,7 @@ def test_damaged_files_end_no_ingest(session: Path, text: bytes, new_database: P
         plain = bytearray(text)
         for _ in range(chance.randrange(1, 60)):
             plain[chance.randrange(len(plain))] = chance.choice(b"0123456789\t\n -x\xff\0")
-        packed = bytearray(gzip.compress(plain))
+        packed = bytearray(gzip.compress(plain, mtime=0))
         if number % 2:
             packed[chance.randrange(len(packed))] = chance.randrange(256)
             del packed[chance.randrange(len(packed)) :]

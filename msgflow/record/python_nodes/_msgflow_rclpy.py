@@ -215,7 +215,7 @@ def _register_source(number, callback):
     code = getattr(callback, "__code__", None)
     # An object that can be called has the function of its class.
     code = code or getattr(type(callback).__dict__.get("__call__"), "__code__", None)
-    if code is not None:
+    if inspect.iscode(code):
         _register(number, "#msgflow source %s:%d" % (code.co_filename, code.co_firstlineno))
 
 

@@ -15,6 +15,12 @@ SELECT
     'callback instances without CPU time' AS detail
 FROM staging.callback_extent AS i
 LEFT JOIN staging.callback_cpu AS c ON i.callback_instance_id = c.callback_instance_id
-WHERE i.end_ns IS NOT NULL AND EXISTS (FROM staging.reader)
+JOIN staging.process AS p ON i.process_id = p.process_id
+WHERE i.end_ns IS NOT NULL
+    AND p.host_id IN (
+        SELECT s.host_id
+        FROM staging.placed_source AS s
+        JOIN staging.reader AS r ON s.trace_index = r.trace_index
+    )
 GROUP BY i.process_id
 HAVING count(c.callback_instance_id) = 0

@@ -29,7 +29,7 @@ seen AS (
         i.node, i.callback, i.run_ns, i.cpu_ns, s.sleeping_ns,
         CASE
             WHEN s.callback_instance_id IS NOT NULL THEN s.preempted_ns + s.runnable_ns
-            WHEN f.thread_id IS NOT NULL
+            WHEN f.thread_id IS NOT NULL AND l.end_ns >= i.end_ns
                 THEN least(i.run_ns - i.cpu_ns, l.before_ns + l.waiting_ns - f.before_ns)
         END AS waiting_ns,
         s.uninterruptible_ns AS disk_ns,
@@ -44,15 +44,21 @@ seen AS (
 summed AS (
     SELECT
         node, callback,
-        sum(run_ns)::BIGINT AS run_ns,
-        sum(cpu_ns)::BIGINT AS running_ns,
+        sum(run_ns) FILTER (waiting_ns IS NOT NULL OR is_unsampled)::BIGINT AS run_ns,
+        sum(cpu_ns) FILTER (waiting_ns IS NOT NULL OR is_unsampled)::BIGINT AS running_ns,
         sum(waiting_ns)::BIGINT AS waiting_ns,
         sum(sleeping_ns)::BIGINT AS sleeping_ns,
         sum(disk_ns)::BIGINT AS disk_ns,
         coalesce(bool_or(sleeping_ns IS NOT NULL), false) AS is_traced,
         1 - sum(asleep) / nullif(sum(samples), 0) AS ready_share,
         coalesce(sum(disk) / nullif(sum(asleep), 0), 0) AS disk_share
-    FROM seen
+    -- What no samples are around tells nothing of what else a thread did, where others are known.
+    FROM (
+        SELECT
+            *,
+            max(waiting_ns) OVER (PARTITION BY node, callback) IS NULL AS is_unsampled
+        FROM seen
+    )
     GROUP BY node, callback
 ),
 -- Where no sample fell into a callback, the most holds.

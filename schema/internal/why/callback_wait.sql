@@ -20,8 +20,13 @@ WITH wait AS MATERIALIZED (
         coalesce(w.earliest_ns, w.latest_ns) AS ready_ns,
         greatest(w.busy_max_ns, 0) AS busy_ns,
         coalesce(
-            w.run_queue_ns + w.preempted_ns, u.before_ns + u.waiting_ns - f.before_ns, 0
+            w.run_queue_ns + w.preempted_ns,
+            CASE WHEN u.end_ns >= w.start_ns
+                THEN u.before_ns + u.waiting_ns - f.before_ns END,
+            0
         ) AS cpu_ns,
+        -- All waits that begin between two samples share what these say.
+        CASE WHEN w.run_queue_ns IS NULL THEN (w.thread_id, f.start_ns) END AS sampled,
         w.meanwhile_callback_ids, w.meanwhile_ns
     FROM explained_wait AS w
     JOIN callback_name AS l ON w.callback_id = l.callback_id
@@ -30,15 +35,15 @@ WITH wait AS MATERIALIZED (
     ASOF LEFT JOIN thread_wait AS u ON w.thread_id = u.thread_id AND w.start_ns > u.start_ns
     LEFT JOIN (
         SELECT
-            callback_id,
+            thread_id,
             min(start_ns) AS start_ns
         FROM main.callback_instance
         WHERE list_contains($runs, run_id)
-        GROUP BY callback_id
+        GROUP BY thread_id
     ) AS b
-        ON w.callback_id = b.callback_id
+        ON w.thread_id = b.thread_id
     WHERE w.start_ns >= $start_ns AND w.start_ns < $end_ns
-        -- What was there before the callback ran first waited for the start of its node.
+        -- What was there before its thread ran any callback waited for the start.
         AND coalesce(coalesce(w.earliest_ns, w.latest_ns) >= b.start_ns, true)
 ),
 -- While it awaits, its callback does not run.
@@ -157,8 +162,12 @@ shared AS (
 ),
 rest AS (
     SELECT
-        w.node, w.callback, w.cpu_ns,
-        greatest(w.wait_ns - coalesce(b.overlap_ns, 0), 0) AS rest_ns
+        w.node, w.callback,
+        greatest(w.wait_ns - coalesce(b.overlap_ns, 0), 0) AS rest_ns,
+        CASE
+            WHEN w.sampled IS NULL THEN w.cpu_ns
+            ELSE rest_ns * least(1, w.cpu_ns / nullif(sum(rest_ns) OVER (PARTITION BY w.sampled), 0))
+        END AS cpu_ns
     FROM wait AS w
     LEFT JOIN (
         SELECT

@@ -12,6 +12,7 @@
 -- column: other_callback VARCHAR  What triggers that
 -- column: other_function VARCHAR  Its function
 -- column: is_same_process BOOLEAN  Both are callbacks of one process
+-- column: is_supposed BOOLEAN  Times alone say so, no kernel trace
 WITH instance AS (
     SELECT
         n.node, n.callback, n.process_id, i.callback_instance_id, i.thread_id, i.start_ns,
@@ -55,7 +56,7 @@ unseen AS (
             i.cpu_ns + greatest(n.least_ns, n.of_path * sleep_ns)::BIGINT AS close_ns
         FROM instance AS i
         CROSS JOIN noticed AS n
-        WHERE i.cpu_source = 'clock'
+        WHERE i.cpu_source = 'clock' AND i.end_ns - i.start_ns - i.cpu_ns >= n.least_ns
     ) AS i
     JOIN (SELECT DISTINCT process_id, thread_id FROM run) AS t
         ON i.process_id = t.process_id AND i.thread_id <> t.thread_id
@@ -70,7 +71,8 @@ woken AS (
         o.node AS other_node,
         o.callback AS other_callback,
         o.function AS other_function,
-        s.process_id = o.process_id AS is_same_process
+        s.process_id = o.process_id AS is_same_process,
+        false AS is_supposed
     FROM slept AS s
     CROSS JOIN noticed AS n
     -- An interrupt has only interrupted what the thread ran.
@@ -83,7 +85,7 @@ woken AS (
     SELECT
         u.node, u.callback, u.sleep_ns,
         CASE WHEN o.node IS NULL THEN 'unknown' ELSE 'thread' END,
-        o.node, o.callback, o.function, true
+        o.node, o.callback, o.function, true, true
     FROM unseen AS u
     LEFT JOIN callback_name AS o ON u.other_id = o.callback_id
 )
@@ -94,10 +96,12 @@ SELECT
     arg_max_null(other_node, total_ns) AS other_node,
     arg_max_null(other_callback, total_ns) AS other_callback,
     arg_max_null(other_function, total_ns) AS other_function,
-    arg_max_null(is_same_process, total_ns) AS is_same_process
+    arg_max_null(is_same_process, total_ns) AS is_same_process,
+    bool_and(is_supposed) AS is_supposed
 FROM (
     SELECT
         node, callback, waker_kind, other_node, other_callback, other_function, is_same_process,
+        bool_and(is_supposed) AS is_supposed,
         sum(sleep_ns) AS total_ns,
         quantile_disc(sleep_ns, 0.95) AS p95_ns
     FROM woken

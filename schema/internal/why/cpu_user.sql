@@ -47,10 +47,14 @@ taken AS (
         u.cpu_ns / (max(u.end_ns) OVER (PARTITION BY w.node)
             - min(u.start_ns) OVER (PARTITION BY w.node)),
         1, 'processes'
-    FROM (SELECT DISTINCT node, host_id, process_id FROM waited) AS w
+    FROM (SELECT DISTINCT node, host_id FROM waited) AS w
     JOIN main.program_usage AS u ON w.host_id = u.host_id
     WHERE list_contains($runs, u.run_id) AND NOT u.is_recorder
-        AND u.process_id IS DISTINCT FROM w.process_id
+        AND u.end_ns > $start_ns AND u.start_ns < $end_ns
+        AND NOT EXISTS (
+            FROM waited AS o
+            WHERE o.node = w.node AND o.process_id = u.process_id
+        )
 )
 SELECT
     t.node,
@@ -66,10 +70,13 @@ SELECT
     any_value(h.cpus) AS cpus
 FROM taken AS t
 LEFT JOIN (
-    SELECT DISTINCT w.node, u.cpus
+    SELECT
+        w.node,
+        max(u.cpus) AS cpus
     FROM waited AS w
     JOIN main.host_usage AS u ON w.host_id = u.host_id
     WHERE list_contains($runs, u.run_id)
+    GROUP BY w.node
 ) AS h
     ON t.node = h.node
 GROUP BY t.node, t.name, t.reason, t.place

@@ -22,15 +22,18 @@ own AS (
     FROM main.thread_usage AS u
     JOIN main.thread AS t ON u.thread_id = t.thread_id
     WHERE list_contains($runs, u.run_id)
+        AND u.thread_id IN (
+            SELECT thread_id FROM main.callback_instance WHERE list_contains($runs, run_id)
+        )
     GROUP BY t.process_id
 )
 SELECT
     n.node,
     bool_or(p.python_version IS NOT NULL) AS is_python,
     max(u.cpus) AS cpus,
-    max(o.cpus) AS own_cpus
+    coalesce(max(o.cpus), 0) AS own_cpus
 FROM (SELECT DISTINCT node, process_id FROM callback_name) AS n
 JOIN main.process AS p ON n.process_id = p.process_id
 JOIN used AS u ON n.process_id = u.process_id
-JOIN own AS o ON n.process_id = o.process_id
+LEFT JOIN own AS o ON n.process_id = o.process_id
 GROUP BY n.node

@@ -5,13 +5,14 @@
 -- when: main.thread_usage
 -- column: thread_id BIGINT  Thread
 -- column: start_ns BIGINT [epoch ns]  Begin of the stretch
+-- column: end_ns BIGINT [epoch ns]  End of it
 -- column: samples BIGINT  Stretches of the thread before this one
 -- column: asleep BIGINT  Those of them at whose end it was asleep
 -- column: disk BIGINT  Those of them at whose end it waited for a page or a disk
 -- column: before_ns BIGINT [ns]  How long it was ready without a CPU before this one
 -- column: waiting_ns BIGINT [ns]  How long in this one
 SELECT
-    thread_id, start_ns,
+    thread_id, start_ns, end_ns,
     count(*) OVER before AS samples,
     count(*) FILTER (WHERE state <> 'R') OVER before AS asleep,
     count(*) FILTER (WHERE state = 'D') OVER before AS disk,

@@ -104,8 +104,9 @@ said AS (
                 '%s has no CPU for %s (p95)%s', coalesce(long_name, 'its thread'),
                 main.duration_text(p95_ns),
                 coalesce(
-                    CASE WHEN quota IS NOT NULL
-                        THEN printf(': its quota of %.1f CPUs stops it', cpus) END,
+                    CASE WHEN quota IS NOT NULL THEN coalesce(
+                        printf(': its quota of %g CPUs stops it', cpus), ': its quota stops it'
+                    ) END,
                     CASE reason
                         WHEN 'quota' THEN ': a quota stops it'
                         WHEN 'real_time_limit' THEN ': the limit of real-time threads stops it'
@@ -186,6 +187,8 @@ said AS (
                             )
                                 THEN printf('%d of %d messages on %s overwritten', lost, published,
                                     topic) END,
+                            CASE WHEN is_supposed AND kind = 'lock'
+                                THEN 'as far as times show: it goes on when that one ends' END,
                             CASE WHEN is_supposed AND kind = 'service'
                                 THEN 'as far as times show: requests are recorded since Kilted' END,
                             CASE

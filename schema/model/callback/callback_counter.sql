@@ -45,7 +45,7 @@ nearest AS (
 counted AS (
     SELECT
         start_event_id, counter,
-        arg_min(value, distance_ns) FILTER (event = 'ros2:callback_end')
+        arg_min(value::HUGEINT, distance_ns) FILTER (event = 'ros2:callback_end')
         - arg_min(value, distance_ns) FILTER (event = 'ros2:callback_start') AS value
     FROM nearest
     GROUP BY start_event_id, counter
@@ -57,4 +57,4 @@ SELECT
 FROM counted AS c
 JOIN staging.callback_number AS n ON c.start_event_id = n.start_event_id
 -- What falls was no counter of one thread.
-WHERE c.value >= 0
+WHERE c.value BETWEEN 0 AND 9223372036854775807

@@ -39,7 +39,9 @@ SELECT
     try_cast(p.fields[3] AS INTEGER) AS pid,
     p.fields[5] AS name,
     nullif(p.fields[6], '') AS command,
-    least(u.ticks * (1e9 / f.ticks), (u.at_ns - u.before_ns)::DOUBLE * f.cpus)::BIGINT AS cpu_ns,
+    try_cast(
+        least(u.ticks * (1e9 / f.ticks), (u.at_ns - u.before_ns)::DOUBLE * f.cpus) AS BIGINT
+    ) AS cpu_ns,
     -- perf is one of them where a recorder started it.
     coalesce(
         list_contains(f.recorders, p.fields[3])
@@ -51,5 +53,5 @@ FROM used AS u
 JOIN program AS p ON u.file = p.file AND u.subject = p.subject
 JOIN staging.usage_file AS f ON u.file = f.file
 LEFT JOIN process AS c ON u.file = c.file AND u.subject = c.subject
-WHERE u.ticks > 0 AND u.before_ns IS NOT NULL AND try_cast(p.fields[3] AS INTEGER) IS NOT NULL
+WHERE u.ticks > 0 AND cpu_ns IS NOT NULL AND u.before_ns IS NOT NULL AND try_cast(p.fields[3] AS INTEGER) IS NOT NULL
 ORDER BY f.host_id, u.at_ns, u.subject

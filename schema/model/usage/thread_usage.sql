@@ -40,7 +40,7 @@ used AS (
         counts[2] - earlier[2] AS waiting_ns,
         counts[3] - earlier[3] AS minor_faults,
         counts[4] - earlier[4] AS major_faults,
-        (counts[5] - earlier[5]) * 10000000 AS io_ns,
+        try_cast((counts[5] - earlier[5]) * 1e7 AS BIGINT) AS io_ns,
         counts[6] - earlier[6] AS voluntary_switches,
         counts[7] - earlier[7] AS forced_switches,
         CASE
