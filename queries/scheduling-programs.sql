@@ -46,4 +46,4 @@ FROM used AS u
 JOIN sampled AS s ON u.host_id = s.host_id
 JOIN main.host AS h ON u.host_id = h.host_id
 LEFT JOIN main.process_label AS l ON u.process_id = l.process_id
-ORDER BY u.run_id, u.cpu_ns DESC, u.host_id, u.pid, u.name, u.command
+ORDER BY u.run_id, cpus DESC, u.host_id, u.pid, u.name, u.command

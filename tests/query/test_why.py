@@ -159,7 +159,7 @@ def test_other_words_change_no_answer(
         ("waits", "/b", "Subscription(/t)"),
     ]
     assert [row["lacks"] for row in said["verdict"]] == [None, "cpu", "samples"]
-    assert "msgflow record shows which callbacks compute, sleep, or have no CPU" in said["notes"]
+    assert any("msgflow record shows which callbacks compute" in note for note in said["notes"])
     assert [row["next"] for row in said["verdict"]] == [
         "check", "query callbacks --each --slowest 5 --node /b",
         "query waits --by instance --slowest 5 --node /b",

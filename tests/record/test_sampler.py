@@ -294,8 +294,8 @@ def test_where_looking_takes_long_it_looks_less_often(tmp_path: Path) -> None:
     command = [sys.executable, "-c", script, str(tmp_path / FILE)]
     with subprocess.Popen(command, stdin=subprocess.PIPE):
         time.sleep(3)
-    # One when it begins, and one when it ends.
-    assert len([line for line in lines_of(tmp_path) if line.startswith("look")]) <= 3
+    # One when it begins, one when it ends, and few between: otherwise there are some thirty.
+    assert len([line for line in lines_of(tmp_path) if line.startswith("look")]) <= 9
 
 
 def test_a_recording_that_is_killed_leaves_what_was_sampled(tmp_path: Path) -> None:

@@ -51,8 +51,8 @@ def test_it_names_each_of_seven_problems_at_once(tmp_path: Path, with_kernel: bo
     pieces = why.slow_flow.table.to_pylist()
     assert pieces[-1]["activity"] == "rest"
     assert sum(piece["duration_ns"] for piece in pieces) == pieces[0]["latency_ns"]
-    kernel = "msgflow record shows which callbacks compute, sleep, or have no CPU"
-    assert (kernel in why.notes) is not with_kernel
+    is_said = any("msgflow record shows which callbacks compute" in note for note in why.notes)
+    assert is_said is not with_kernel
 
 
 def test_nothing_stands_out_where_nothing_was_planted(tmp_path: Path) -> None:

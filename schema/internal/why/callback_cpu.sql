@@ -3,11 +3,11 @@
 --     clock of the thread shows how long it was on a CPU, and samples what else it did: how often
 --     they found it asleep in the callback. It was ready without a CPU for no longer than between
 --     those around the callback.
--- grain: one row per node and callback with known CPU time
+-- grain: one row per node and callback of whose time most is known
 -- reads: callback_name, callback_use, thread_wait
 -- column: node VARCHAR  Node
 -- column: callback VARCHAR  What triggers it
--- column: run_ns BIGINT [ns]  Sum of their durations
+-- column: run_ns BIGINT [ns]  Sum of their durations, as far as it is known what the thread did
 -- column: running_ns BIGINT [ns]  Part of it: on a CPU
 -- column: waiting_ns BIGINT [ns]  Part of it: ready, and without a CPU; NULL: not known
 -- column: sleeping_ns BIGINT [ns]  Part of it: asleep; NULL: not known
@@ -21,12 +21,14 @@ WITH instance AS (
     JOIN callback_use AS u ON n.node = u.node AND n.callback = u.callback
     WHERE list_contains($runs, i.run_id)
         AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
-        AND i.cpu_ns IS NOT NULL
         AND 2 * (i.end_ns - i.start_ns) > coalesce(u.long_ns, 0)
 ),
 seen AS (
     SELECT
-        i.node, i.callback, i.run_ns, i.cpu_ns, s.sleeping_ns,
+        i.node, i.callback, s.sleeping_ns,
+        i.run_ns AS all_ns,
+        i.run_ns - coalesce(s.unknown_ns, 0) AS run_ns,
+        coalesce(s.running_ns, i.cpu_ns) AS cpu_ns,
         CASE
             WHEN s.callback_instance_id IS NOT NULL THEN s.preempted_ns + s.runnable_ns
             WHEN f.thread_id IS NOT NULL AND l.end_ns >= i.end_ns
@@ -40,6 +42,7 @@ seen AS (
     LEFT JOIN main.callback_schedule AS s ON i.callback_instance_id = s.callback_instance_id
     ASOF LEFT JOIN thread_wait AS f ON i.thread_id = f.thread_id AND i.start_ns >= f.start_ns
     ASOF LEFT JOIN thread_wait AS l ON i.thread_id = l.thread_id AND i.end_ns > l.start_ns
+    WHERE coalesce(s.running_ns, i.cpu_ns) IS NOT NULL
 ),
 summed AS (
     SELECT
@@ -60,6 +63,7 @@ summed AS (
         FROM seen
     )
     GROUP BY node, callback
+    HAVING 2 * sum(run_ns) >= sum(all_ns)
 ),
 -- Where no sample fell into a callback, the most holds.
 shared AS (

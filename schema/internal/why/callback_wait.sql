@@ -166,7 +166,8 @@ rest AS (
         greatest(w.wait_ns - coalesce(b.overlap_ns, 0), 0) AS rest_ns,
         CASE
             WHEN w.sampled IS NULL THEN w.cpu_ns
-            ELSE rest_ns * least(1, w.cpu_ns / nullif(sum(rest_ns) OVER (PARTITION BY w.sampled), 0))
+            ELSE rest_ns
+                * least(1, w.cpu_ns / nullif(sum(rest_ns) OVER (PARTITION BY w.sampled), 0))
         END AS cpu_ns
     FROM wait AS w
     LEFT JOIN (
