@@ -53,5 +53,8 @@ FROM used AS u
 JOIN program AS p ON u.file = p.file AND u.subject = p.subject
 JOIN staging.usage_file AS f ON u.file = f.file
 LEFT JOIN process AS c ON u.file = c.file AND u.subject = c.subject
-WHERE u.ticks > 0 AND cpu_ns IS NOT NULL AND u.before_ns IS NOT NULL AND try_cast(p.fields[3] AS INTEGER) IS NOT NULL
+WHERE u.ticks > 0
+    AND cpu_ns IS NOT NULL
+    AND u.before_ns IS NOT NULL
+    AND try_cast(p.fields[3] AS INTEGER) IS NOT NULL
 ORDER BY f.host_id, u.at_ns, u.subject
