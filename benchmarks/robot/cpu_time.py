@@ -72,7 +72,7 @@ class Call:
 
     @property
     def is_right(self) -> bool:
-        """Whether what is told is near enough."""
+        """Whether msgflow's CPU time is near enough."""
         limit_ns = _ABSOLUTE_NS + _RELATIVE * self.true_ns + _WAIT_NS * self.waits
         return self.told_ns is not None and abs(self.told_ns - self.true_ns) <= limit_ns
 

@@ -128,7 +128,9 @@ def record(
         if profile is not None:
             samples = recorded_samples(directory, profile, is_ours=bool(program), note=note)
             stack.enter_context(samples)
-        stack.enter_context(sampled(directory, note))
+        # A window of `watch` reads no samples, and goes on for as long as it likes.
+        if channel.rotation_ns is None:
+            stack.enter_context(sampled(directory, note))
         output = None
         if log is not None:
             output = stack.enter_context(_written(log))

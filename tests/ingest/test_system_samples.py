@@ -87,7 +87,7 @@ def test_samples_in_an_archive_are_read(session: Path, text: bytes, new_database
 
 @pytest.mark.thorough
 def test_each_host_has_its_samples(other_trace: Path, new_database: Path, tmp_path: Path) -> None:
-    """Of two machines, one of which is given another name."""
+    """The recording has two machines, and one gets another name."""
     pair = Path(shutil.copytree(other_trace, tmp_path / "pair"))
     ingest([pair], tmp_path / "before.duckdb")
     count = 0

@@ -15,10 +15,12 @@ from recording.tracetools import build_tracetools
 
 from msgflow import trace
 from msgflow.errors import RecordingError
+from msgflow.ingest.readings import of_readings_alone
 from msgflow.record import cpu_time, session
 from msgflow.record.cpu_time import EVENTS, recorded_cpu_time, why_not
 from msgflow.record.lttng import Session
 from msgflow.record.session import Channel
+from msgflow.trace.model import TraceInfo
 from msgflow.watch import watched_sessions
 
 REFUSE_PERF = Path(__file__).with_name("refuse_perf.py")
@@ -195,3 +197,16 @@ def test_a_view_of_the_only_recording_finds_it(
     both = [Session("drive-cpu", tmp_path / "cpu", False), Session("drive", tmp_path, False)]
     monkeypatch.setattr(watched_sessions, "sessions", lambda: both)
     assert watched_sessions.watched_place(None) == tmp_path
+
+
+def test_an_ingest_knows_its_session() -> None:
+    """With the counter or, of a process that may not read it, without; but not alone."""
+    read = ("perf_thread_task_clock",)
+    events = tuple(sorted(EVENTS))
+    clocks = TraceInfo(0, Path("cpu/a"), counters=read, event_names=events)
+    refused = TraceInfo(1, Path("cpu/b"), event_names=events)
+    robot = TraceInfo(2, Path("ust"), event_names=(*events, "ros2:rcl_init"))
+    kernel = TraceInfo(3, Path("kernel"), domain="kernel", event_names=("sched_switch",))
+    assert of_readings_alone([clocks, refused, robot, kernel]) == {0, 1}
+    assert not of_readings_alone([clocks, refused, kernel])
+    assert not of_readings_alone([refused, robot])

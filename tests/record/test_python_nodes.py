@@ -69,7 +69,7 @@ class Robot:
         return ended.returncode, ended.stdout, ended.stderr
 
     def traced(self) -> list[str]:
-        """Return the events of callbacks and executors, without what is told beside them."""
+        """Return the events of callbacks and executors, without the marks beside them."""
         return [line for line in self.lines() if not BESIDE.search(line)]
 
     def lines(self, word: str = "") -> list[str]:

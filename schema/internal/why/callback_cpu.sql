@@ -70,7 +70,7 @@ shared AS (
     SELECT
         node, callback, run_ns, running_ns, sleeping_ns, disk_ns, disk_share,
         CASE
-            WHEN is_traced OR ready_share IS NULL THEN waiting_ns
+            WHEN is_traced OR ready_share IS NULL OR waiting_ns IS NULL THEN waiting_ns
             ELSE least(waiting_ns, greatest(run_ns * ready_share - running_ns, 0))::BIGINT
         END AS waiting_ns
     FROM summed
