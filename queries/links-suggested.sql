@@ -87,8 +87,13 @@ queued AS (
             ),
             message_count, topic_name
         ) AS evidence,
-        CASE WHEN bool_or(is_loop) THEN
-            printf('messages on %s descend from what the node publishes', topic_name) END AS doubt
+        concat_ws(
+            '; ',
+            CASE WHEN bool_or(is_loop) THEN
+                printf('messages on %s descend from what the node publishes', topic_name) END,
+            CASE WHEN bool_or(is_pool) THEN
+                'several threads published: one may have overtaken another' END
+        ) AS doubt
     FROM dead_end
     WHERE is_queue
     GROUP BY node_id, subscription_id, topic_name, message_count
@@ -248,10 +253,12 @@ undecided AS (
 chosen_by_time AS (SELECT DISTINCT publisher_id FROM synchronous WHERE kind = 'approximate_sync'),
 kept AS (
     SELECT
-        d.node_id, d.subscription_id, d.is_timed, d.topic_name, d.message_count,
+        d.node_id, d.subscription_id, d.is_timed, d.topic_name, d.message_count, d.leading_count,
         list(DISTINCT d.output_topic ORDER BY d.output_topic) AS outputs,
         concat_ws(
             '; ',
+            CASE WHEN d.leading_count > 0 THEN
+                printf('%d others on %s lead on directly', d.leading_count, d.topic_name) END,
             CASE WHEN count(u.subscription_id) > 0 THEN
                 'which of its outputs use the messages is not known' END,
             CASE WHEN bool_or(d.is_loop) THEN
@@ -276,7 +283,8 @@ kept AS (
     LEFT JOIN undecided AS u ON d.subscription_id = u.subscription_id
     LEFT JOIN chosen_by_time AS a ON d.publisher_id = a.publisher_id
     WHERE NOT d.is_queue
-    GROUP BY d.node_id, d.subscription_id, d.is_timed, d.topic_name, d.message_count
+    GROUP BY
+        d.node_id, d.subscription_id, d.is_timed, d.topic_name, d.message_count, d.leading_count
 ),
 periodic AS (
     SELECT
@@ -288,7 +296,8 @@ periodic AS (
             'it published %s, while %s led nowhere',
             c.evidence,
             string_agg(
-                printf('%d messages on %s', k.message_count, k.topic_name), ' and '
+                printf('%d messages on %s', k.message_count - k.leading_count, k.topic_name),
+                ' and '
                 ORDER BY k.topic_name, k.subscription_id
             )
         ) AS evidence,

@@ -13,13 +13,17 @@ around the call.
 from __future__ import annotations
 
 import contextlib
+import functools
 import itertools
 import json
 import os
+import queue
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from random import Random
 
 import rclpy
 from rcl_interfaces.srv import ListParameters
@@ -97,6 +101,18 @@ class Witness(Node):
             work(call=call)
 
         self.create_subscription(UInt64, topic, run, 10, callback_group=group)
+
+    def on_working(self, topic: str, *starts) -> None:
+        """Start jobs with each message of a topic: each of `starts` is given what to run."""
+
+        def run(message: UInt64) -> None:
+            begin = time.monotonic_ns()
+            with self._callback(begin, "sub", topic, message.data) as row:
+                for start, work in starts:
+                    start(functools.partial(work, call=self._running.number))
+            row["t1"] = time.monotonic_ns()
+
+        self.create_subscription(UInt64, topic, run, 10)
 
     def after_turns(self, seconds: float, work) -> None:
         """Do some work at a period, between turns of the executor: no callback, no timer."""
@@ -469,6 +485,39 @@ def awaiting(truth: Truth) -> list[Node]:
     return [node]
 
 
+def working(truth: Truth) -> list[Node]:
+    """Answer each message of /scan on other threads, after 5 to 80 ms: several at a time."""
+    node = Witness("working", truth)
+    pool, waiting = ThreadPoolExecutor(3), queue.Queue()
+    random = Random(1)
+
+    def later(send):
+        def work(**more: int) -> None:
+            time.sleep(random.uniform(0.005, 0.08))
+            send(**more)
+
+        return work
+
+    def work_off() -> None:
+        while True:
+            waiting.get()()
+
+    threading.Thread(target=work_off, daemon=True).start()
+    node.on_working(
+        "/scan",
+        (pool.submit, later(node.sender("/pooled"))),
+        (lambda work: pool.submit(time.sleep, 0.02).add_done_callback(lambda _: work()),
+         node.sender("/done")),
+        (lambda work: threading.Thread(target=work).start(), later(node.sender("/threaded"))),
+        (lambda work: threading.Timer(random.uniform(0.01, 0.1), work).start(),
+         node.sender("/timed")),
+        (waiting.put, later(node.sender("/queued"))),
+    )  # fmt: skip
+    result = node.sender("/result")
+    node.on("/tick", lambda: (busy(0.001), result()))
+    return [node]
+
+
 def ticking(truth: Truth) -> list[Node]:
     """Publish /scan and, more often, /tick."""
     node = Witness("ticking", truth)
@@ -587,6 +636,8 @@ SYSTEMS = {
     "awaiting_threads": {"sink": (sink, SingleThreadedExecutor),
                          "awaiting": (awaiting, MultiThreadedExecutor),
                          "ticking": (ticking, SingleThreadedExecutor)},
+    "working": {"sink": (sink, SingleThreadedExecutor), "working": (working, MultiThreadedExecutor),
+                "ticking": (ticking, SingleThreadedExecutor)},
 }  # fmt: skip
 if EventsExecutor is None:
     del SYSTEMS["events"]

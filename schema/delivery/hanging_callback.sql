@@ -1,6 +1,7 @@
 -- description: Threads that did not come back from a callback: the last one that they began has no
 --     end, and nothing shows that its thread did anything else afterwards. A callback is left
---     out if a gap may hide its end, or if its process recorded no end of any callback.
+--     out if a gap may hide its end, or if its process recorded no end of any callback. So is a job
+--     of Python, which no executor waits for.
 -- grain: one row per such thread
 WITH last_run AS (
     SELECT
@@ -23,8 +24,9 @@ LEFT JOIN (
     FROM store.executor_state
     GROUP BY thread_id
 ) AS e ON l.thread_id = e.thread_id
+JOIN store.callback AS c ON l.callback_id = c.callback_id
 WHERE l.callback_instance_id IS NOT NULL
-    AND coalesce(e.start_ns <= l.start_ns, true)
+    AND coalesce(e.start_ns <= l.start_ns, c.kind <> 'function')
     AND l.process_id IN (
         SELECT process_id FROM store.callback_instance WHERE end_event_id IS NOT NULL
     )

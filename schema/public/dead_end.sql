@@ -1,14 +1,16 @@
 -- description: Subscriptions at which flows end although their node publishes: at least three
 --     messages came, and no callback of theirs led to anything, while timers, other messages or
---     what is outside of callbacks led to publications. Either the node only consumes the messages,
---     or it keeps them: then a link has to be declared. That is not likely if the messages descend
---     from what the node publishes itself; if messages on another topic led to publications before
---     the first one came, or in shorter callbacks, as keeping takes less time than using; or if
---     what comes outside of callbacks does not answer them one by one. Topics of ROS, topics that
---     the node also publishes on, and inputs of annotations are left out. So are outputs that
---     report on the node: a timer publishes them at most twice a second, nothing follows from them
---     elsewhere, and other nodes publish there, too (/diagnostics), or the node has faster outputs
---     and no node that publishes takes them.
+--     what is outside of callbacks led to publications. If less than half of the callbacks did,
+--     to what no other messages led, timers count that publish more. Either the node only
+--     consumes the messages, or it keeps them: then a link has to be declared. That is not likely
+--     if the messages descend from what the node publishes itself; if messages on another topic
+--     led to publications before the first one came, or in shorter callbacks, as keeping takes
+--     less time than using; or if what comes outside of callbacks neither answers them one by
+--     one, nor comes from a thread that they started. Topics of ROS, topics that the node also
+--     publishes on, and inputs of annotations are left out. So are outputs that report on the
+--     node: a timer publishes them at most twice a second, nothing follows from them elsewhere,
+--     and other nodes publish there, too (/diagnostics), or the node has faster outputs and no
+--     node that publishes takes them.
 -- grain: one row per such subscription, publisher of its node, and timer or subscription whose
 --     callbacks published; one row for what it published outside of callbacks
 -- param: runs
@@ -17,6 +19,7 @@
 -- column: subscription_id BIGINT  Subscription at which flows end
 -- column: topic_name VARCHAR  Its topic
 -- column: message_count BIGINT  Messages that it got
+-- column: leading_count BIGINT  Those of them that led on directly
 -- column: publisher_id BIGINT  Publisher of the node
 -- column: output_topic VARCHAR  Its topic
 -- column: timer_id BIGINT  Timer whose callbacks published; NULL: none
@@ -30,15 +33,19 @@
 -- column: is_loop BOOLEAN  The messages descend from what the node publishes
 -- column: is_queue BOOLEAN  Outside of callbacks as much was published as messages came, each after
 --     the message of its number
+-- column: is_pool BOOLEAN  Several threads did: one may have overtaken another
 -- column: is_likely BOOLEAN  Nothing speaks against a link
 CREATE OR REPLACE MACRO main.dead_end(runs) AS TABLE
 -- Logging is no effect.
 WITH RECURSIVE caused AS NOT MATERIALIZED (
     SELECT
         l.kind, l.callback_instance_id, l.take_id, l.subscription_id, l.publication_id,
-        l.publisher_id, p.node_id, p.topic_name
+        l.publisher_id, p.node_id, p.topic_name,
+        -- What a job publishes again (derive.job_again).
+        (l.kind = 'direct' AND l.candidate_count > 1 AND NOT o.is_ambiguous) IS TRUE AS is_again
     FROM store.link_causal AS l
     JOIN store.publisher AS p ON l.publisher_id = p.publisher_id
+    JOIN store.process AS o ON p.process_id = o.process_id
     WHERE list_contains(runs, l.run_id) AND NOT p.is_internal
 ),
 instance AS MATERIALIZED (
@@ -50,30 +57,30 @@ instance AS MATERIALIZED (
     JOIN store.callback_instance AS i ON c.callback_id = i.callback_id
     WHERE list_contains(runs, d.run_id) AND list_contains(runs, i.run_id)
 ),
--- What led to something, but for known takes: derive.unanswered_subscription leaves those out.
 effective AS (
-    SELECT callback_instance_id FROM caused WHERE take_id IS NULL
-    UNION ALL
+    SELECT callback_instance_id FROM caused WHERE NOT is_again
+    UNION
     SELECT callback_instance_id FROM store.link_request WHERE list_contains(runs, run_id)
-    UNION ALL
+    UNION
     SELECT callback_instance_id FROM store.link_response WHERE list_contains(runs, run_id)
 ),
 idle AS MATERIALIZED (
     SELECT
         i.run_id, i.node_id, i.subscription_id,
         count(*) AS message_count,
+        count(e.callback_instance_id) AS leading_count,
         min(i.start_ns) AS first_ns,
         quantile_disc(i.run_ns, 0.5) AS run_ns
     FROM instance AS i
     LEFT JOIN effective AS e ON i.callback_instance_id = e.callback_instance_id
     GROUP BY i.run_id, i.node_id, i.subscription_id
-    HAVING count(*) >= 3 AND count(e.callback_instance_id) = 0
+    HAVING count(*) >= 3 AND 2 * leading_count < message_count
 ),
 published AS MATERIALIZED (
     SELECT
         l.node_id, l.publisher_id, c.timer_id,
         c.subscription_id AS trigger_id,
-        b.start_ns,
+        b.start_ns, b.thread_id,
         i.end_ns - i.start_ns AS run_ns
     FROM caused AS l
     SEMI JOIN idle AS d ON l.node_id = d.node_id
@@ -82,26 +89,33 @@ published AS MATERIALIZED (
     JOIN store.callback AS c ON i.callback_id = c.callback_id
     LEFT JOIN store.timer AS t ON c.timer_id = t.timer_id
     LEFT JOIN store.subscription AS s ON c.subscription_id = s.subscription_id
-    WHERE l.kind = 'direct' AND l.topic_name IS NOT NULL
+    WHERE l.kind = 'direct' AND l.topic_name IS NOT NULL AND NOT l.is_again
         AND l.node_id = coalesce(t.node_id, s.node_id)
     UNION ALL
-    SELECT p.node_id, b.publisher_id, NULL, NULL, b.start_ns, NULL
+    SELECT p.node_id, b.publisher_id, NULL, NULL, b.start_ns, b.thread_id, NULL
     FROM store.publication AS b
     JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
     SEMI JOIN idle AS d ON p.node_id = d.node_id
-    ANTI JOIN caused AS l ON b.publication_id = l.publication_id
+    ANTI JOIN (FROM caused WHERE NOT is_again) AS l ON b.publication_id = l.publication_id
     WHERE list_contains(runs, b.run_id) AND NOT p.is_internal AND p.topic_name IS NOT NULL
 ),
 every_output AS MATERIALIZED (
     SELECT
-        d.run_id, d.node_id, d.subscription_id, d.message_count, d.run_ns, p.publisher_id,
-        p.timer_id, p.trigger_id,
+        d.run_id, d.node_id, d.subscription_id, d.message_count, d.leading_count, d.run_ns,
+        p.publisher_id, p.timer_id, p.trigger_id,
         count(*) AS publication_count,
         count(*) FILTER (WHERE p.start_ns < d.first_ns) AS early_count,
         quantile_disc(p.run_ns, 0.5) AS publishing_run_ns
     FROM idle AS d
     JOIN published AS p ON d.node_id = p.node_id
+    WHERE d.leading_count = 0
+        OR p.timer_id IS NOT NULL AND NOT EXISTS (
+            FROM published AS o
+            JOIN published AS j ON o.publisher_id = j.publisher_id
+            WHERE o.trigger_id = d.subscription_id AND j.trigger_id <> d.subscription_id
+        )
     GROUP BY ALL
+    HAVING count(*) > d.leading_count
 ),
 slow_output AS MATERIALIZED (
     SELECT o.node_id, o.publisher_id, p.topic_name
@@ -147,7 +161,9 @@ output AS (
 ),
 -- One after the other, and few that wait at the end.
 queue AS (
-    SELECT m.subscription_id, b.publisher_id
+    SELECT
+        m.subscription_id, b.publisher_id,
+        count(DISTINCT b.thread_id) > 1 AS is_pool
     FROM (
         SELECT
             node_id, subscription_id, start_ns,
@@ -157,7 +173,7 @@ queue AS (
     ) AS m
     JOIN (
         SELECT
-            node_id, publisher_id, start_ns,
+            node_id, publisher_id, thread_id, start_ns,
             row_number() OVER (PARTITION BY publisher_id ORDER BY start_ns) AS number,
             count(*) OVER (PARTITION BY publisher_id) AS number_of_all
         FROM published
@@ -207,7 +223,8 @@ loop AS (
     FROM supposed_descent
 )
 SELECT
-    o.run_id, o.node_id, o.subscription_id, s.topic_name, o.message_count, o.publisher_id,
+    o.run_id, o.node_id, o.subscription_id, s.topic_name, o.message_count, o.leading_count,
+    o.publisher_id,
     p.topic_name AS output_topic,
     o.timer_id, o.trigger_id,
     CASE
@@ -218,10 +235,14 @@ SELECT
     o.publication_count, o.early_count, o.run_ns, o.publishing_run_ns,
     l.subscription_id IS NOT NULL AS is_loop,
     q.subscription_id IS NOT NULL AS is_queue,
+    coalesce(q.is_pool, false) AS is_pool,
     l.subscription_id IS NULL
     AND (
         o.timer_id IS NOT NULL
         OR q.subscription_id IS NOT NULL
+        OR (o.subscription_id, o.publisher_id) IN (
+            SELECT (subscription_id, publisher_id) FROM caused WHERE is_again
+        )
         OR o.trigger_id IS NOT NULL
         AND o.early_count = 0 AND coalesce(o.run_ns <= o.publishing_run_ns, true)
     ) AS is_likely

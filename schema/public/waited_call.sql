@@ -25,6 +25,7 @@ WITH step AS (
             PARTITION BY coalesce(continues_id, callback_instance_id) ORDER BY start_ns
         ) AS resumed_ns
     FROM main.callback_instance
+    SEMI JOIN main.executor_thread USING (thread_id)
     WHERE continues_id IS NOT NULL
         OR callback_instance_id IN (SELECT continues_id FROM main.callback_instance)
 ),

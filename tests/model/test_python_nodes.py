@@ -37,6 +37,13 @@ def hear(system: RosSystem, handle: int, callback: int, stamp: int, thread: Thre
     system.start(thread, callback)
 
 
+def job(system: RosSystem, number: int, callback: int, stamp: int, thread: Thread = OTHER) -> None:
+    system.python(thread, number, "job")
+    system.start(thread, callback)
+    system.publish(thread, 0x10, stamp, layers="rcl rmw")
+    system.end(thread, callback)
+
+
 def resume(system: RosSystem, number: int, callback: int, thread: Thread = MAIN) -> None:
     system.ready(thread)
     system.python(thread, number, "resume")
@@ -71,12 +78,13 @@ def test_later_steps_follow_from_the_first(python: RosSystem, analyse: Analyse) 
     ]
     # A step is no call of the subscription.
     assert analysis.rows(
-        "SELECT label, kind, count(*) FROM callback_instance JOIN callback USING (callback_id) "
-        "JOIN callback_label USING (callback_id) GROUP BY ALL ORDER BY label"
+        "SELECT node, label, kind, count(*) FROM callback_instance "
+        "JOIN callback USING (callback_id) JOIN callback_label USING (callback_id) "
+        "GROUP BY ALL ORDER BY label"
     ) == [
-        ("Subscription(/a)", "subscription", 2),
-        ("Subscription(/b)", "subscription", 1),
-        ("heard (goes on)", "function", 3),
+        ("/python", "Subscription(/a)", "subscription", 2),
+        ("/python", "Subscription(/b)", "subscription", 1),
+        ("/python", "heard (goes on)", "function", 3),
     ]
     assert analysis.rows("SELECT python_version FROM process") == [("3.12.3",)]
 
@@ -181,3 +189,71 @@ def test_no_message_causes_what_no_callback_published(python: RosSystem, analyse
     python.take(MAIN, 0x21, 21, layers="rmw rcl")
     python.publish(MAIN, 0x10, 1, layers="rcl rmw")
     assert analyse(python).rows(CAUSES) == []
+
+
+def test_jobs_on_threads_follow_from_the_callback(python: RosSystem, analyse: Analyse) -> None:
+    """Out of order, as pools work. Their threads are of no executor, although both ran the job."""
+    python.python(MAIN, 5, "function node:work")
+    for number, stamp in ((1, 11), (2, 12)):
+        hear(python, 0x20, 0xCA, stamp)
+        python.python(MAIN, number, "step")
+        python.end(MAIN, 0xCA)
+    job(python, 2, 5, 1)
+    job(python, 1, 5, 2)
+    job(python, 3, 5, 3, POOL)
+    python.idle(MAIN)
+    analysis = analyse(python)
+    assert analysis.rows(CAUSES) == [
+        (1, 12, "direct", 1),
+        (2, 11, "direct", 1),
+        (3, None, "direct", 1),
+    ]
+    assert analysis.rows("SELECT count(*) FROM executor_thread") == [(1,)]
+
+
+@pytest.mark.parametrize("then", ["at once", "told", "another's", "led on"])
+def test_a_job_that_publishes_again(python: RosSystem, analyse: Analyse, then: str) -> None:
+    """It may use what its node was told since: the first publication, too."""
+    python.node(MAIN, 0x2, "beside")
+    python.subscription(MAIN, 0x22, "/a", callback=0xCC, node=0x2)
+    python.python(MAIN, 5, "function node:work")
+    hear(python, 0x20, 0xCA, 11)
+    python.python(MAIN, 1, "step")
+    python.end(MAIN, 0xCA)
+
+    def told(stamp: int, handle: int = 0x21, callback: int = 0xCB) -> None:
+        hear(python, handle, callback, stamp)
+        python.end(MAIN, callback)
+
+    told(21)
+    python.python(OTHER, 1, "job")
+    python.start(OTHER, 5)
+    python.publish(OTHER, 0x10, 1, layers="rcl rmw")
+    if then == "told":
+        told(22)
+    elif then == "another's":
+        told(12, 0x22, 0xCC)
+    elif then == "led on":
+        hear(python, 0x21, 0xCB, 22)
+        python.publish(MAIN, 0x10, 9, layers="rcl rmw")
+        python.end(MAIN, 0xCB)
+    python.publish(OTHER, 0x10, 2, layers="rcl rmw")
+    python.end(OTHER, 5)
+    python.idle(MAIN)
+    candidates = 1 + (then == "told")
+    rows = [row for row in analyse(python).rows(CAUSES) if row[0] != 9]
+    assert rows == [(1, 11, "direct", candidates), (2, 11, "direct", candidates)]
+
+
+def test_timers_that_jobs_start_again(python: RosSystem, analyse: Analyse) -> None:
+    """Each is a job of its own. The first one ran before the node was told anything else."""
+    python.python(MAIN, 5, "function node:work")
+    hear(python, 0x20, 0xCA, 11)
+    python.python(MAIN, 1, "step")
+    python.end(MAIN, 0xCA)
+    job(python, 1, 5, 1)
+    hear(python, 0x20, 0xCA, 12)
+    python.end(MAIN, 0xCA)
+    job(python, 1, 5, 2, POOL)
+    python.idle(MAIN)
+    assert analyse(python).rows(CAUSES) == [(1, 11, "direct", 1), (2, 11, "direct", 2)]

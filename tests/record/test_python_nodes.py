@@ -210,6 +210,231 @@ def test_tasks_go_on_for_what_made_them(robot: Robot) -> None:
     ]
 
 
+JOBS = """
+    import queue, threading, time
+    from concurrent.futures import ThreadPoolExecutor
+    results = queue.SimpleQueue()
+
+    def work(*words):
+        time.sleep(0.01)
+        results.put(words)
+        return words
+
+    def hear(*callbacks):
+        for number, callback in enumerate(callbacks, 1001):
+            executor.ready.append((subscription.Subscription(number, callback), [number]))
+        for _ in callbacks:
+            executor.spin_once()
+
+"""
+
+
+def run_jobs(robot: Robot, code: str) -> list[str]:
+    """Run code that works on threads; return what it printed, and check that it is as ever."""
+    program = f"{JOBS.strip()}\n{textwrap.indent(textwrap.dedent(code), '    ')}"
+    ended = robot.run(textwrap.dedent(f"    {program}"), traced=False)
+    assert ended[0] == 0, ended[2]
+    assert robot.run(textwrap.dedent(f"    {program}")) == ended
+    return ended[1].splitlines()
+
+
+def jobs(robot: Robot) -> list[tuple[str, str]]:
+    """Return the name of each job, and the callback that it goes on for: these have 1001 and on."""
+    lines = robot.traced()
+    names = dict(re.findall(r"register (\d+) #msgflow function \S*:(\S+)", "\n".join(lines)))
+    found = []
+    for at, line in enumerate(lines):
+        if (match := re.fullmatch(r"register (\d+) #msgflow job", line)) is not None:
+            begin = lines.index(f"register {match[1]} #msgflow step")
+            of = next(each for each in lines[begin::-1] if re.match(r"callback_start \d{4}", each))
+            number = next(each for each in lines[at:] if re.match(r"callback_start \d{,3}$", each))
+            found.append((names[number.split()[1]], of.split()[1]))
+    return found
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        "pool.submit(work, message)",
+        "pool.submit(work, message).result()",
+        "list(pool.map(work, [message]))",
+        "threading.Thread(target=work, args=(message,)).start()",
+        "threading.Timer(0.01, work, [message]).start()",
+        "pool.submit(time.sleep, 0.1).add_done_callback(work)",
+    ],
+)
+def test_a_job_goes_on_for_the_callback_that_started_it(robot: Robot, start: str) -> None:
+    """Each begins and ends on its thread; what no callback starts is nobody's."""
+    run_jobs(
+        robot,
+        f"""
+        pool = ThreadPoolExecutor(2)
+        message = 0
+        {start}
+        results.get()
+
+        def heard(message):
+            {start}
+
+        hear(heard, lambda message: {start})
+        results.get(), results.get()
+        pool.shutdown()
+        """,
+    )
+    assert sorted(job for job in jobs(robot) if job[0] != "sleep") == [
+        ("work", "1001"),
+        ("work", "1002"),
+    ]
+    lines = robot.lines()
+    assert len(robot.lines("callback_start")) == len(robot.lines("callback_end"))
+    assert lines.count("rclcpp_executor_execute 1001") == 1
+
+
+def test_threads_are_as_they_were(robot: Robot) -> None:
+    """Of any class, with their names, errors and attributes; a second start is an error."""
+    out = run_jobs(
+        robot,
+        """
+        class Worker(threading.Thread):
+            def run(self):
+                print(self.name, self.daemon, sorted(vars(self)) == before)
+                1 / 0
+
+        class Again(threading.Timer):
+            def run(self):
+                for _ in range(2):
+                    self.function(*self.args)
+
+        class Odd(threading.Thread):
+            @property
+            def run(self):
+                return work
+
+        threading.excepthook = lambda args: print(args.exc_type.__name__)
+
+        def heard(message):
+            global before
+            worker = Worker(name="mine", daemon=True)
+            worker.run = worker.run
+            del worker.run
+            before = sorted(vars(worker))
+            worker.start()
+            worker.join()
+            try:
+                worker.start()
+            except RuntimeError as error:
+                print(error)
+            for thread in (Again(0, work, [1]), Odd(), threading.Thread()):
+                thread.start()
+                thread.join()
+            with ThreadPoolExecutor(1) as pool:
+                print(repr(pool.submit(int, "x").exception()), pool.submit(None).exception())
+                try:
+                    pool.submit()
+                except TypeError as error:
+                    print("TypeError")
+
+        hear(heard)
+        """,
+    )
+    assert out[:3] == ["mine True True", "ZeroDivisionError", "threads can only be started once"]
+    assert [job[0] for job in jobs(robot)].count("work") == 2
+
+
+def test_what_a_thread_gets_from_a_queue_goes_on_for_what_put_it_there(robot: Robot) -> None:
+    """Also where a callback starts the thread, and where the program empties the queue itself."""
+    run_jobs(
+        robot,
+        """
+        channel, lazy, threads = queue.Queue(), queue.Queue(), []
+
+        def loop(source, name):
+            while (item := source.get()) is not None:
+                work(name, item)
+
+        def loop_later(source):
+            loop(source, "later")
+
+        threading.Thread(target=loop, args=(channel, "first"), daemon=True).start()
+        channel.put("nobody's")
+        results.get()
+
+        def heard(message):
+            channel.put("lost")
+            with channel.mutex:
+                channel.queue.clear()
+            channel.put(message)
+            lazy.put(message)
+            if not threads:
+                threads.append(threading.Thread(target=loop_later, args=[lazy], daemon=True))
+                threads[0].start()
+            results.get(), results.get()
+
+        hear(heard, heard, heard)
+        channel.put(None), lazy.put(None)
+        threads[0].join()
+        """,
+    )
+    assert sorted(set(jobs(robot))) == sorted(
+        [*(("loop", number) for number in ("1001", "1002", "1003")), ("loop_later", "1001")]
+    )
+    assert len(robot.lines("callback_start")) == len(robot.lines("callback_end"))
+
+
+def test_what_may_be_for_either_of_two_goes_on_for_none(robot: Robot) -> None:
+    """A worker needs a buffer that another one has put back. What it put back itself is no work."""
+    run_jobs(
+        robot,
+        """
+        channel, buffers = queue.Queue(), queue.Queue()
+
+        def loop():
+            while True:
+                buffer, item = buffers.get(), channel.get()
+                work(buffer, item)
+                buffers.put(buffer)
+
+        def heard(message):
+            channel.put(message)
+            results.get()
+
+        def other(message):
+            buffers.put("other")
+            heard(message)
+
+        buffers.put("own")
+        threading.Thread(target=loop, daemon=True).start()
+        hear(heard, heard, other, heard)
+        """,
+    )
+    assert ("loop", "1002") in jobs(robot)
+    # The other buffer came from a callback of before.
+    assert [line for line in robot.traced() if "callback" in line][-1] == "callback_end 1004"
+
+
+def test_jobs_that_nobody_records(robot: Robot) -> None:
+    run_jobs(
+        robot,
+        """
+        import os
+        session = os.environ["FAKE_SESSION"]
+        channel = queue.Queue()
+        pool = ThreadPoolExecutor(1)
+
+        def heard(message):
+            if os.path.exists(session):
+                os.remove(session)
+            pool.submit(work, message).result()
+            channel.put(message)
+            print(channel.get())
+
+        hear(heard, heard)
+        open(session, "w").close()
+        """,
+    )
+    assert {of for _, of in jobs(robot)} == {"1001"}
+
+
 def test_an_exception_ends_the_callback(robot: Robot) -> None:
     code, out, error = robot.run("""
         def failing(message):

@@ -20,7 +20,7 @@ STAGE = """
 CREATE TABLE annotated (run_id BIGINT DEFAULT 1, annotation_id BIGINT DEFAULT 1,
     kind VARCHAR DEFAULT 'queue', publication_id BIGINT, publisher_id BIGINT DEFAULT 1,
     trace_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 2, start_ns BIGINT, start_event_id BIGINT,
-    subscription_id BIGINT);
+    callback_instance_id BIGINT, subscription_id BIGINT);
 CREATE TABLE run (subscription_id BIGINT DEFAULT 1, callback_instance_id BIGINT,
     thread_id BIGINT DEFAULT 1, start_event_id BIGINT);
 INSERT INTO store.annotation_input DEFAULT VALUES;
@@ -112,6 +112,17 @@ def test_what_may_be_missing_makes_the_count_doubtful(rules: duckdb.DuckDBPyConn
     assert links(rules, [10], [15]) == [(1, 1, 1)]
     rules.execute("UPDATE store.subscription SET created_ns = NULL")
     assert links(rules, [10], [15]) == [(1, 1, 2)]
+
+
+def test_several_threads_that_publish_may_overtake_each_other(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """But for callbacks, of which a group runs one after the other on any thread."""
+    links(rules, [10, 20], [15, 25])
+    rules.execute("UPDATE annotated SET thread_id = 3 WHERE publication_id = 2")
+    assert rules.execute(LINKS).fetchall() == [(1, 1, 2), (2, 2, 2)]
+    rules.execute("UPDATE annotated SET callback_instance_id = 9 WHERE publication_id = 2")
+    assert rules.execute(LINKS).fetchall() == [(1, 1, 1), (2, 2, 1)]
 
 
 def test_every_output_answers_every_message(rules: duckdb.DuckDBPyConnection) -> None:

@@ -14,6 +14,7 @@ begin with `#msgflow`:
 * `#msgflow source FILE:LINE` of a handle or number: where its function begins.
 * `#msgflow step` of a number: something goes on later, because of what runs here.
 * `#msgflow resume` of such a number: what goes on is the callback that begins next on the thread.
+* `#msgflow job` of such a number: likewise, on a thread of no executor.
 * `#msgflow cpu` of nanoseconds: so long the callback or step that has just ended had a CPU, by the
   clock of its thread.
 * `#msgflow collect GENERATION` of nanoseconds: so long Python has just collected garbage on the
@@ -24,12 +25,15 @@ An interrupt that comes while Python collects garbage is raised in what runs nex
 function here, Python only prints it; rclpy shuts its context down all the same.
 """
 
+import collections
+import concurrent.futures
 import ctypes
 import functools
 import gc
 import inspect
 import itertools
 import os
+import queue
 import sys
 import threading
 import time
@@ -44,6 +48,8 @@ _ANNOUNCED = {
     "Timer": ("rclcpp_timer_callback_added",),
     "Service": ("rclcpp_service_callback_added",),
 }
+# What these modules run on threads goes on for many callbacks.
+_MACHINERY = ("asyncio", "concurrent", "logging", "multiprocessing", "rclpy")
 _KINDS = {"SingleThreadedExecutor": "single_threaded", "MultiThreadedExecutor": "multi_threaded"}
 
 _is_on = True
@@ -78,6 +84,13 @@ class _Thread(threading.local):
     is_waiting = False
     # Tasks that run inside each other.
     depth = 0
+    # Callbacks that run inside each other, or a job of one.
+    calls = 0
+    # The job: its number, its step, the CPU time at its begin, whether it may get others, and the
+    # queue from which it got one.
+    job = None
+    # The step in which what was got from a queue was put there; 0: none, or one of this thread.
+    handed = 0
     # What the running task takes from.
     entity = None
     # The next callback is not for what was taken last.
@@ -145,6 +158,12 @@ def wrap_executors(executors):
             # Lyrical: asyncio has others of the same base.
             owner = getattr(module, "Base" + name, None) or getattr(module, name)
             _wrap(owner, "__init__", functools.partial(_made, name))
+        _wrap(concurrent.futures.ThreadPoolExecutor, "submit", _passes_on)
+        _wrap(concurrent.futures.Future, "add_done_callback", _passes_on)
+        _wrap(threading.Thread, "start", _starts)
+        _wrap(queue.Queue, "_put", _puts)
+        _wrap(queue.Queue, "_get", _got)
+        _wrap(queue.Queue, "get", _gets)
         os.register_at_fork(after_in_child=_begin_anew)
         gc.callbacks.append(_collect)
     except Exception as error:
@@ -212,7 +231,7 @@ def _register_callback(handle, callback):
 def _register_source(number, callback):
     while isinstance(callback, functools.partial):
         callback = callback.func
-    code = getattr(callback, "__code__", None)
+    code = getattr(callback, "__code__", None) or getattr(callback, "f_code", None)
     # An object that can be called has the function of its class.
     code = code or getattr(type(callback).__dict__.get("__call__"), "__code__", None)
     if inspect.iscode(code):
@@ -320,7 +339,10 @@ def _number_of(callback):
 
 def _function(callback, suffix=""):
     """Return the number of a function that no subscription, timer or service has."""
-    symbol = _symbol(callback) + suffix
+    return _numbered(_symbol(callback) + suffix, callback)
+
+
+def _numbered(symbol, callback):
     number = _functions.get(symbol)
     if number is None:
         if len(_functions) >= _MOST_FUNCTIONS:
@@ -339,14 +361,15 @@ def _symbol(callback):
     return "%s:%s" % (callback.__module__, callback.__qualname__)
 
 
-def _start(number, step):
+def _start(number, step, goes_on=b"#msgflow resume"):
     """Begin a callback; return the CPU time of its thread until then."""
+    _thread.calls += 1
     if _thread.session != _session:
         _name_thread()
     if step:
         if _thread.depth:
             _ready()
-        _tracepoints.rclcpp_callback_register(step, b"#msgflow resume")
+        _tracepoints.rclcpp_callback_register(step, goes_on)
     elif _thread.is_unclear:
         _thread.is_unclear = False
         _tracepoints.rclcpp_executor_get_next_ready()
@@ -355,6 +378,7 @@ def _start(number, step):
 
 
 def _end(number, step, begin_ns):
+    _thread.calls -= 1
     end_ns = _cpu_time_ns()
     # What an action does after its first callback goes on because of that.
     if not step and _thread.entity is not None and not hasattr(_thread.entity, "_msgflow"):
@@ -401,6 +425,164 @@ def _collect(phase, details, is_finalizing=sys.is_finalizing):
             _register(duration_ns, "#msgflow collect %d" % details["generation"])
     except Exception as error:
         _turn_off(error)
+
+
+# How work goes on, on threads of no executor.
+
+
+def _passes_on(original):
+    def pass_on(self, *args, **kwargs):
+        if args and _thread.calls and _is_recorded:
+            args = (_job(args[0]), *args[1:])
+        return original(self, *args, **kwargs)
+
+    return pass_on
+
+
+def _starts(original):
+    def start(self):
+        # One that runs already cannot be started.
+        if _thread.calls and _is_recorded and self.ident is None:
+            try:
+                _start_as_job(self)
+            except Exception:  # A thread like no other.
+                pass
+        return original(self)
+
+    return start
+
+
+def _start_as_job(thread):
+    if isinstance(thread, threading.Timer):
+        # It is asleep until then, perhaps again and again.
+        thread.function = _job(thread.function)
+        return
+    run = thread.run
+    is_plain = getattr(run, "__func__", None) is threading.Thread.run
+    job = _job(run, thread._target if is_plain else run, is_thread=True)
+    if job is not run and "run" not in vars(thread):
+
+        def run_once():
+            del thread.run
+            job()
+
+        thread.run = run_once
+
+
+def _job(function, named=None, is_thread=False):
+    """Return a function that goes on, on another thread, because of what runs now."""
+    try:
+        function = getattr(function, "_msgflow_job", function)
+        named = named or function
+        module = getattr(named, "__module__", None) or ""
+        if not callable(named) or module.partition(".")[0] in _MACHINERY:
+            return function
+        number = _function(named)
+        step = _thread.step or _new_step()
+
+        def run(*args, **kwargs):
+            if _thread.calls or not _is_recorded:
+                return function(*args, **kwargs)
+            _begin_job(number, step, is_thread)
+            try:
+                return function(*args, **kwargs)
+            finally:
+                _end_job()
+
+        run._msgflow_job = function
+        return functools.update_wrapper(run, function, updated=())
+    except Exception:  # A function like no other.
+        return function
+
+
+def _begin_job(number, step, is_thread, source=None):
+    _thread.step = step
+    begin_ns = _start(number, step, b"#msgflow job")
+    _thread.job = (number, step, begin_ns, is_thread, source)
+
+
+def _end_job():
+    job, _thread.job = _thread.job, None
+    if job is not None:
+        _end(*job[:3])
+        _thread.step = 0
+
+
+# What a thread gets from a queue is a job of what put it there: until it gets the next one.
+
+
+def _puts(original):
+    def _put(self, item):
+        original(self, item)
+        if _is_recorded and (_thread.calls or hasattr(self, "_msgflow_steps")):
+            try:
+                step = (_thread.step or _new_step()) if _thread.calls else 0
+                _steps_of(self, len(self.queue) - 1).append((id(item), step, threading.get_ident()))
+            except Exception:  # A queue like no other.
+                pass
+
+    return _put
+
+
+def _got(original):
+    def _get(self):
+        item = original(self)
+        if hasattr(self, "_msgflow_steps"):
+            try:
+                identity, step, thread = _steps_of(self, len(self.queue) + 1).popleft()
+                if identity == id(item) and thread != threading.get_ident():
+                    _thread.handed = step
+            except Exception:
+                pass
+        return item
+
+    return _get
+
+
+def _steps_of(source, count):
+    """Return in which step each item of a queue was put there; its program may change it, too."""
+    steps = vars(source).setdefault("_msgflow_steps", collections.deque())
+    if len(steps) != count:
+        steps.clear()
+        steps.extend([(0, 0, 0)] * count)
+    return steps
+
+
+def _gets(original):
+    def get(self, *args, **kwargs):
+        # A callback that gets something goes on.
+        if not _is_recorded or _thread.calls > bool(_thread.job):
+            return original(self, *args, **kwargs)
+        job = _thread.job
+        if job is not None and job[4] is self:
+            _end_job()
+        _thread.handed = 0
+        item = original(self, *args, **kwargs)
+        try:
+            _receive(self, _thread.handed, sys._getframe(1))
+        except Exception:
+            pass
+        return item
+
+    return get
+
+
+def _receive(source, step, caller):
+    job = _thread.job
+    if job is None:
+        while caller.f_globals.get("__name__") == "queue":
+            caller = caller.f_back
+        module = caller.f_globals.get("__name__", "")
+        if step and module.partition(".")[0] not in _MACHINERY:
+            code = caller.f_code
+            symbol = "%s:%s" % (module, getattr(code, "co_qualname", code.co_name))
+            _begin_job(_numbered(symbol, caller), step, True, source)
+    elif job[3] and job[4] is None:
+        # A thread that gets a second one works for all.
+        _thread.job = (*job[:4], source)
+    elif job[4] is not None and step not in (0, job[1]):
+        # It may be for either.
+        _end_job()
 
 
 def _new_step():

@@ -3,8 +3,9 @@
 --     these events were enabled. What the threads did between callbacks is not known: they have no
 --     executor states, and how long a message waited for them is bounded by callbacks only. Direct
 --     links are not affected. Callbacks of Agnocast do not count: its executors have no events.
---     Nor do those of a thread that was seen to serve what came first first, as an events executor
---     does: when it waited is known, at least in part.
+--     Nor do jobs of Python, which no executor runs, nor callbacks of a thread that was seen to
+--     serve what came first first, as an events executor does: when it waited is known, at least
+--     in part.
 -- cause: rclcpp has no tracepoints in a StaticSingleThreadedExecutor, in a loop of the process that
 --     calls callbacks itself (wait sets), and in an EventsExecutor. The recording shows an
 --     EventsExecutor only if it has one thread and served enough messages.
@@ -24,6 +25,7 @@ silent AS (
     ANTI JOIN staging.executor_first AS x ON p.thread_id = x.thread_id
     ANTI JOIN staging.thread_break AS b ON p.thread_id = b.thread_id
     ANTI JOIN (FROM staging.queued_message WHERE is_in_order) AS o ON p.thread_id = o.thread_id
+    ANTI JOIN (FROM staging.python_mark WHERE kind = 'job') AS m ON p.thread_id = m.thread_id
     -- Of these the recording left the events out.
     ANTI JOIN (SELECT process_id FROM staging.executor_named WHERE kind IN (
         'single_threaded_executor', 'multi_threaded_executor'

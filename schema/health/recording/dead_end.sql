@@ -1,7 +1,8 @@
 -- title: Messages that end at a node which publishes
--- description: No callback of a subscription led to anything, but the node publishes by a timer,
---     outside of callbacks, or because of other messages. If it keeps the messages for that, paths
---     and flows that should go on end there, and no end-to-end latency goes through the node.
+-- description: No callback of a subscription led to anything, or few did, but the node publishes by
+--     a timer, outside of callbacks, or because of other messages. If it keeps the messages for
+--     that, paths and flows that should go on end there, and no end-to-end latency goes through the
+--     node.
 -- cause: The trace does not show that a node keeps a message for later. Or it really only consumes
 --     these messages.
 -- cure: msgflow suggest links writes a file with the links that are likely; with --apply it
@@ -15,9 +16,10 @@ WITH dead_end AS MATERIALIZED (FROM main.dead_end([$run_id])),
 input AS (
     SELECT
         node_id, topic_name,
-        sum(message_count)::BIGINT AS number
+        sum(message_count)::BIGINT AS number,
+        sum(leading_count)::BIGINT AS leading
     FROM (
-        SELECT DISTINCT node_id, subscription_id, topic_name, message_count
+        SELECT DISTINCT node_id, subscription_id, topic_name, message_count, leading_count
         FROM dead_end
         WHERE is_likely
     )
@@ -39,9 +41,10 @@ output AS (
 )
 SELECT
     n.run_id, i.node_id, i.topic_name,
-    i.number AS count,
+    i.number - i.leading AS count,
     printf(
-        '%s on %s end at %s, which publishes %s',
+        '%s%s on %s end at %s, which publishes %s',
+        CASE WHEN i.leading > 0 THEN printf('%d of ', i.number - i.leading) ELSE '' END,
         derive.counted(i.number, 'message'), i.topic_name,
         main.node_label(n.full_name, p.name, p.pid), o.published
     ) AS detail

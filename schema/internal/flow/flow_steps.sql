@@ -87,7 +87,6 @@ happened AS (
     FROM named
     GROUP BY callback_instance_id
 ),
--- Callbacks of one subscription lead on, or none does.
 ended AS (
     SELECT
         d.subscription_id,
@@ -97,7 +96,7 @@ ended AS (
             subscription_id,
             derive.names_in_words(output_topic) || ' ' || cause AS published
         FROM main.dead_end([$run_id])
-        WHERE NOT is_loop
+        WHERE NOT is_loop AND leading_count = 0
         GROUP BY subscription_id, cause
     ) AS d
     GROUP BY d.subscription_id

@@ -4,8 +4,8 @@
 --     too, or fewer: that is shared out as the waits of the callback are. Of a queue of 1 only the
 --     age counts, since the next message replaces one that is lost.
 -- grain: one row per path, callback to blame, and callback that waits for it
--- reads: application_path, breakdown, callback_name, callback_use, callback_wait, delivery,
---     named_path
+-- reads: application_path, breakdown, callback_job, callback_name, callback_use, callback_wait,
+--     delivery, named_path
 -- column: path VARCHAR [path]  The path
 -- column: node VARCHAR  Node to blame; NULL: not known
 -- column: callback VARCHAR  What triggers its callback; NULL: not known, or not traced
@@ -143,7 +143,10 @@ SELECT
     NULL::BIGINT AS lost,
     NULL::BIGINT AS published
 FROM piece AS p
-LEFT JOIN callback_use AS u ON p.node = u.node AND p.what = u.callback
+LEFT JOIN hop AS h ON p.path_id = h.path_id AND p.hop = h.hop
+LEFT JOIN callback_job AS j
+    ON p.node = j.node AND p.what = j.callback AND h.topic_name = j.topic_name
+LEFT JOIN callback_use AS u ON p.node = u.node AND coalesce(j.job, p.what) = u.callback
 WHERE p.is_run
 GROUP BY p.path, p.node, p.what, u.callback
 UNION ALL

@@ -1,5 +1,6 @@
 -- title: How an explanation names callbacks
--- description: The later steps of a coroutine belong to the callback that it began in.
+-- description: The later steps of a coroutine belong to the callback that it began in. A job on a
+--     thread of no executor is one of its own, of the same node.
 -- grain: one row per callback object
 -- column: callback_id BIGINT  The callback object
 -- column: node VARCHAR  Node
@@ -10,19 +11,22 @@
 WITH begun AS (
     SELECT
         s.callback_id,
-        any_value(f.callback_id) AS first_id
+        any_value(f.callback_id) AS first_id,
+        bool_and(x.thread_id IS NULL) AS is_job
     FROM main.callback_instance AS s
     JOIN main.callback_instance AS f ON s.continues_id = f.callback_instance_id
+    LEFT JOIN main.executor_thread AS x ON s.thread_id = x.thread_id
     WHERE list_contains($runs, s.run_id)
     GROUP BY s.callback_id
 )
 SELECT
-    c.callback_id, l.node,
+    c.callback_id, n.node,
     l.label AS callback,
     -- A Python function has its module in front, a C++ function arguments and template parameters,
     -- one within the other. Of a bound method C++ keeps only the class, of a lambda where it
     -- stands.
     CASE
+        WHEN b.is_job THEN NULL
         WHEN regexp_matches(f.symbol, '^[^\s:(<]+:[^:]')
             THEN replace(regexp_replace(f.symbol, '^[^:]*:', ''), '.<locals>', '')
         WHEN NOT regexp_matches(f.symbol, '::\*|\{lambda') THEN nullif(trim(list_reduce(
@@ -33,6 +37,8 @@ SELECT
     f.source, c.process_id
 FROM main.callback AS c
 LEFT JOIN begun AS b ON c.callback_id = b.callback_id
-JOIN main.callback AS f ON coalesce(b.first_id, c.callback_id) = f.callback_id
+JOIN main.callback AS f
+    ON CASE WHEN b.is_job IS FALSE THEN b.first_id ELSE c.callback_id END = f.callback_id
 JOIN main.callback_label AS l ON f.callback_id = l.callback_id
+JOIN main.callback_label AS n ON coalesce(b.first_id, c.callback_id) = n.callback_id
 WHERE list_contains($runs, c.run_id)

@@ -54,6 +54,8 @@ awaiting AS (
     FROM main.callback_instance AS s
     JOIN main.callback_instance AS f ON s.continues_id = f.callback_instance_id
     JOIN callback_name AS l ON f.callback_id = l.callback_id
+    -- Of another name is a job on another thread.
+    JOIN callback_name AS o ON s.callback_id = o.callback_id AND l.callback = o.callback
     WHERE list_contains($runs, s.run_id)
     GROUP BY f.callback_instance_id, l.node, l.callback, f.start_ns
 ),

@@ -1,6 +1,7 @@
 -- title: What a recording cannot tell, or what is wrong with the system
 -- description: Findings about the paths of an explanation, or about the recording as a whole. The
---     verdict has sentences of its own for others, or they delay nothing by themselves.
+--     verdict has sentences of its own for others, or they delay nothing by themselves. Messages
+--     that end at a node count where paths begin at it: what it publishes may be made of them.
 -- grain: one row per kind of finding, three at most
 -- reads: paths
 -- column: name VARCHAR  Kind of finding: its file in `schema/health`
@@ -8,7 +9,10 @@
 -- column: places BIGINT  At how many places
 -- column: sentence VARCHAR  The sentence
 WITH step AS (
-    SELECT list_distinct(flatten(list(string_split(path, ' → ')))) AS names FROM paths
+    SELECT
+        list_distinct(flatten(list(string_split(path, ' → ')))) AS names,
+        list(string_split(path, ' → ')[1]) AS begins
+    FROM paths
 ),
 touching AS (
     SELECT
@@ -20,8 +24,9 @@ touching AS (
     WHERE list_contains($runs, f.run_id)
         AND f.severity IN ('error', 'warning')
         AND f.name NOT IN (
-            'busy_waiting', 'dead_end', 'executor_preempted', 'never_taken', 'started_late'
+            'busy_waiting', 'executor_preempted', 'never_taken', 'started_late'
         )
+        AND (f.name <> 'dead_end' OR list_contains((SELECT begins FROM step), n.full_name))
         AND (
             coalesce(f.topic_name, n.full_name, p.full_name) IS NULL
             AND (
@@ -41,7 +46,15 @@ SELECT
     name,
     arg_min(subject, place) AS subject,
     count(*) AS places,
-    printf('%s — %s: %s', any_value(title), arg_min(subject, place), arg_min(detail, place))
+    printf(
+        CASE name
+            WHEN 'dead_end' THEN
+                'flows begin at %2$s, but %3$s: if it keeps them for that, data are older '
+                || '(msgflow suggest links)'
+            ELSE '%s — %s: %s'
+        END,
+        any_value(title), arg_min(subject, place), arg_min(detail, place)
+    )
     || CASE WHEN count(*) > 1 THEN printf('; %d more like this (msgflow check)', count(*) - 1)
         ELSE '' END AS sentence
 FROM touching

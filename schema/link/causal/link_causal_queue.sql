@@ -5,8 +5,9 @@
 --     had come by then. A publication for which no message is left answers none. It shows that the
 --     count was wrong until then: the links before it have two candidates. So have links where a
 --     depth would leave too few messages for the publications that follow, all links of a
---     subscription whose creation was not traced, since messages may have waited already, and those
---     behind a gap, where a message may be missing.
+--     subscription whose creation was not traced, since messages may have waited already, those
+--     behind a gap, where a message may be missing, and all where several threads publish outside
+--     of callbacks: one may overtake the other.
 -- grain: one row per annotation, input, and publication by one of its outputs that answers it
 -- param: publications VARCHAR  Name of the rows of derive.annotated_publication
 -- param: runs VARCHAR  Name of the rows of derive.annotated_run
@@ -43,17 +44,17 @@ counted AS (
         p.*, m.queue_depth,
         coalesce(m.number, 0) AS come_count,
         greatest(0, max(p.number - coalesce(m.number, 0)) OVER so_far) AS surplus_count,
-        greatest(
-            0, max(p.number - coalesce(m.number, 0)) OVER (
-                PARTITION BY p.annotation_id, p.input_id, p.publisher_id
-            )
-        ) AS last_surplus_count
+        greatest(0, max(p.number - coalesce(m.number, 0)) OVER of_all) AS last_surplus_count,
+        min(CASE WHEN p.callback_instance_id IS NULL THEN p.thread_id END) OVER of_all
+        <> max(CASE WHEN p.callback_instance_id IS NULL THEN p.thread_id END) OVER of_all
+            AS is_unordered
     FROM published AS p
     ASOF LEFT JOIN message AS m
         ON p.annotation_id = m.annotation_id
         AND p.input_id = m.subscription_id
         AND p.start_event_id > m.start_event_id
-    WINDOW so_far AS (
+    WINDOW of_all AS (PARTITION BY p.annotation_id, p.input_id, p.publisher_id),
+    so_far AS (
         PARTITION BY p.annotation_id, p.input_id, p.publisher_id
         ORDER BY p.start_event_id ROWS UNBOUNDED PRECEDING
     )
@@ -99,7 +100,8 @@ broken AS (
 SELECT
     p.run_id, p.annotation_id, p.kind, p.publication_id, m.callback_instance_id,
     CASE
-        WHEN m.is_old OR p.surplus_count < p.last_surplus_count OR p.lost_count > p.most_count
+        WHEN m.is_old OR p.is_unordered OR p.surplus_count < p.last_surplus_count
+            OR p.lost_count > p.most_count
             OR least(k.event_id, o.event_id) <= p.start_event_id THEN 2
         ELSE 1
     END AS candidate_count,

@@ -1,6 +1,7 @@
 -- description: Callback objects with what they belong to. One whose creation was not traced learns
 --     its subscription or service from the messages or requests that it was called with (the most
---     frequent), else what it belongs to from the executor.
+--     frequent), else what it belongs to from the executor. What goes on for a callback of Python
+--     has the node of that.
 -- grain: one row per callback object
 -- when: staging.callback_object
 WITH learned AS (
@@ -46,7 +47,7 @@ complete AS (
             WHEN v.service_id IS NOT NULL THEN 'service'
             ELSE c.kind
         END AS kind,
-        t.node_id
+        coalesce(t.node_id, s.node_id, e.node_id) AS node_id
     FROM owned AS c
     LEFT JOIN staging.subscription AS s ON c.subscription_event_id = s.event_id
     LEFT JOIN staging.timer AS t ON c.timer_event_id = t.event_id
@@ -59,10 +60,19 @@ complete AS (
         ON e.service_id IS NULL
         AND c.kind IN ('unknown', 'function', 'service')
         AND c.event_id = v.callback_event_id
+),
+going_on AS (
+    SELECT
+        b.callback_event_id,
+        mode(f.callback_event_id ORDER BY f.callback_event_id) AS first_event_id
+    FROM staging.callback_binding AS b
+    JOIN staging.callback_binding AS f ON b.call_event_id = f.start_event_id
+    WHERE b.kind = 'function'
+    GROUP BY b.callback_event_id
 )
 SELECT
     c.callback_id, c.process_id,
-    coalesce(c.node_id, s.node_id, v.node_id) AS node_id,
+    coalesce(c.node_id, s.node_id, v.node_id, f.node_id) AS node_id,
     -- In Python the goal is executed there: the request is answered before.
     CASE
         WHEN c.kind = 'service' AND ends_with(v.service_name, '/_action/send_goal') THEN 'action'
@@ -82,3 +92,5 @@ LEFT JOIN (
     ON c.process_id = p.process_id AND c.callback_handle = p.number
 LEFT JOIN staging.subscription AS s ON c.subscription_id = s.subscription_id
 LEFT JOIN staging.service AS v ON c.service_id = v.service_id
+LEFT JOIN going_on AS g ON c.event_id = g.callback_event_id
+LEFT JOIN complete AS f ON g.first_event_id = f.event_id

@@ -9,12 +9,12 @@
 -- grain: one row per callback_start
 -- when: staging.callback_run
 
--- Instances of Python that go on for something earlier: later steps of a coroutine, tasks, what is
--- done with a response. Each with what it follows from: the instance on whose thread, and inside of
--- which, the tracer said so (`step`); else what the thread took in that turn of its executor,
--- before any callback, a response or a request. Of several that go on for one request, the first is
--- its callback.
--- when: staging.python_mark WHERE kind = 'resume'
+-- Instances of Python that go on for something earlier: later steps of a coroutine, tasks, jobs on
+-- threads of no executor, what is done with a response. Each with what it follows from: the
+-- instance on whose thread, and inside of which, the tracer said so (`step`); else what the thread
+-- took in that turn of its executor, before any callback, a response or a request. Of several that
+-- go on for one request, the first is its callback.
+-- when: staging.python_mark WHERE kind IN ('resume', 'job')
 -- columns: start_event_id BIGINT, call_event_id BIGINT, response_event_id BIGINT, request_event_id
 --     BIGINT
 CREATE OR REPLACE TEMP TABLE callback_step AS
@@ -25,7 +25,7 @@ resumed AS (
     SELECT m.number, m.process_id, b.start_event_id
     FROM staging.python_mark AS m
     ASOF JOIN begun AS b ON m.thread_id = b.thread_id AND m.event_id < b.start_event_id
-    WHERE m.kind = 'resume'
+    WHERE m.kind IN ('resume', 'job')
     QUALIFY row_number() OVER (PARTITION BY b.start_event_id ORDER BY m.event_id DESC) = 1
 ),
 origin AS (

@@ -1,10 +1,10 @@
 -- description: What the tracer of Python nodes (msgflow record) says besides the events of rclcpp:
 --     which processes it traces (`python`), which executor a thread works for (`executor`), where
 --     the function of a callback begins (`source`), that something will go on later because of what
---     runs (`step`), that the next callback of the thread is what goes on (`resume`), the CPU time
---     of what has just ended (`cpu`) and the duration of a collection of garbage that has
---     (`collect`) [ns], and how Python calls a thread (`thread`). The tracer registers a callback
---     that never runs, whose symbol says it.
+--     runs (`step`), that the next callback of the thread is what goes on (`resume`; `job`: on a
+--     thread of no executor), the CPU time of what has just ended (`cpu`) and the duration of a
+--     collection of garbage that has (`collect`) [ns], and how Python calls a thread (`thread`).
+--     The tracer registers a callback that never runs, whose symbol says it.
 -- grain: one row per such event
 -- when: raw.ros2_rclcpp_callback_register WHERE symbol LIKE '#msgflow %'
 SELECT

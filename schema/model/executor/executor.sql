@@ -71,7 +71,8 @@ QUALIFY row_number() OVER (
 
 -- Which threads work for the same executor: those of a process that execute callbacks of an
 -- executor that names itself, else the same callbacks, directly or through others, or that take
--- turns in waiting for work. The smallest thread of such a group stands for it.
+-- turns in waiting for work. Threads of Python that do jobs are of none because of that. The
+-- smallest thread of such a group stands for it.
 CREATE OR REPLACE TEMP TABLE executor_member AS
 WITH RECURSIVE
 -- What ties threads: an executor by its event, or a callback by its (never negative) identity.
@@ -86,6 +87,7 @@ runs AS (
     JOIN staging.callback_number AS n ON r.start_event_id = n.start_event_id
     ANTI JOIN staging.callback_group_member AS s
         ON n.callback_id = s.callback_id AND s.executor_event_id IS NOT NULL
+    ANTI JOIN (FROM staging.python_mark WHERE kind = 'job') AS m ON r.thread_id = m.thread_id
     UNION ALL
     SELECT
         thread_id,
