@@ -18,7 +18,12 @@ SELECT
     9 AS place,
     node, path, topic_name, harm_ns, p95_ns,
     p95_ns AS run_ns,
-    'callbacks' AS lacks,
+    CASE WHEN node NOT IN (
+        SELECT n.full_name
+        FROM main.node AS n
+        JOIN main.process AS p ON n.process_id = p.process_id
+        WHERE p.python_version IS NOT NULL
+    ) THEN 'callbacks' END AS lacks,
     [node || topic_name] AS claims
 FROM harm
 WHERE matters AND callback IS NULL

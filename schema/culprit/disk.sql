@@ -4,6 +4,7 @@
 -- next: query callbacks --each --slowest 5 --node {node}
 SELECT
     6 AS place,
-    *
+    *,
+    disk_ns / measured_ns AS share
 FROM long_callback
 WHERE disk_ns > 0.5 * measured_ns

@@ -18,8 +18,15 @@ FROM (
     SELECT
         full_name, created_ns,
         (created_ns - quantile_disc(created_ns, 0.5) OVER ())::BIGINT AS late_ns
-    FROM main.node
-    WHERE list_contains($runs, run_id) AND NOT is_inferred
+    -- A node that is made again was there before.
+    FROM (
+        SELECT
+            full_name,
+            min(created_ns) AS created_ns
+        FROM main.node
+        WHERE list_contains($runs, run_id) AND NOT is_inferred
+        GROUP BY full_name
+    )
 ) AS c
 -- A display or a log that begins late loses nothing that others need.
 JOIN application_path AS p ON list_contains(p.steps[:-2], c.full_name)
@@ -29,7 +36,10 @@ JOIN (
         arg_max(topic_name, reasons['before_subscription']) AS topic_name,
         max(reasons['before_subscription'])::BIGINT AS missed,
         arg_max(published, reasons['before_subscription']) AS published
-    FROM delivery
+    FROM (
+        FROM delivery
+        QUALIFY subscription_id = min(subscription_id) OVER (PARTITION BY subscriber, topic_name)
+    )
     WHERE reasons['before_subscription'] > 0
     GROUP BY subscriber
 ) AS d

@@ -1,11 +1,12 @@
 -- description: Callbacks that run long on a path, or behind which others wait. How long: as long as
 --     those that are to blame for half of the time above the usual.
 -- grain: one row per node and callback
--- reads: callback_cpu, callback_use, harm, thread_load
+-- reads: callback_cpu, callback_use, harm, held_message, new_reader, noticed, thread_load
 -- kind: inline
 WITH judged AS (
     SELECT
         h.*, u.usual_ns, u.run_ns, u.long_ns, u.long_instances, u.instances, u.period_ns, l.load,
+        CASE WHEN l.per_take > 1 + n.of_messages THEN l.per_take END AS per_take,
         -- What matters to the callback itself, or to the one that waits for it longest.
         least(u.limit_ns, w.limit_ns) AS limit_ns
     FROM harm AS h
@@ -13,6 +14,7 @@ WITH judged AS (
     LEFT JOIN callback_use AS w
         ON h.waiting_node = w.node AND h.waiting_callback = w.callback
     LEFT JOIN thread_load AS l ON h.node = l.node AND h.callback = l.callback
+    CROSS JOIN noticed AS n
     WHERE h.matters
 ),
 -- One that always takes long is not said to do so at times.
@@ -31,14 +33,20 @@ SELECT
     h.node, h.callback, h.function, h.path, h.topic_name, h.harm_ns, h.p95_ns, h.lost, h.published,
     h.takes_ns AS run_ns,
     h.usual_ns,
-    CASE WHEN h.is_at_times THEN round(h.instances / h.long_instances)::BIGINT END AS every,
+    CASE WHEN h.is_at_times THEN h.long_instances END AS long_calls,
     h.instances AS count,
-    h.period_ns, h.load, h.waiting_node, h.waiting_callback, h.limit_ns,
+    h.period_ns, h.load, h.per_take, h.waiting_node, h.waiting_callback, h.limit_ns,
     [h.node || h.callback, h.node || ' waits', coalesce(h.waiting_node, h.node) || ' waits']
     AS claims,
     c.run_ns AS measured_ns,
-    c.running_ns, c.waiting_ns, c.sleeping_ns, c.disk_ns
+    c.running_ns, c.waiting_ns, c.sleeping_ns, c.disk_ns,
+    m.node IS NOT NULL AS is_held,
+    r.reader, r.reader_topic, r.since_ns, r.before_ns
 FROM named AS h
 LEFT JOIN callback_cpu AS c ON h.node = c.node AND h.callback = c.callback
+LEFT JOIN held_message AS m
+    ON h.node = m.node AND h.callback = m.callback
+    AND h.waiting_node = m.waiting_node AND h.topic_name = m.topic_name
+LEFT JOIN new_reader AS r ON h.node = r.node AND h.callback = r.callback
 -- What a coroutine awaits on the path is no time that it takes.
 WHERE h.takes_ns >= h.limit_ns

@@ -1,6 +1,6 @@
 -- title: A publisher and a subscription that never met
 -- description: Both were there, and the node of the subscription ran callbacks, but it took no
---     message.
+--     message. If their processes had other messages of each other, they are in one domain.
 -- grain: one row per topic, publishing node and subscribing node
 -- reads: application_path, callback_use, named_path, node_restart, noticed
 -- next: check
@@ -13,6 +13,14 @@ SELECT
     f.count AS lost,
     f.count AS published,
     p.full_name AS other,
+    EXISTS (
+        FROM main.link_transport AS l
+        JOIN main.publication AS b ON l.publication_id = b.publication_id
+        JOIN main.take AS t ON l.take_id = t.take_id
+        WHERE b.process_id IN (n.process_id, p.process_id)
+            AND t.process_id IN (n.process_id, p.process_id)
+            AND b.process_id <> t.process_id
+    ) AS is_supposed,
     [n.full_name || f.topic_name] AS claims
 FROM main.finding AS f
 JOIN main.node AS n ON f.node_id = n.node_id

@@ -2,7 +2,7 @@
 -- description: As a kernel trace or samples show: before its callback, or in it. What has the CPU
 --     is named by program; a quota by its cgroup.
 -- grain: one row per node and path
--- reads: application_path, blame, callback_cpu, callback_use, cpu_quota, cpu_user, harm, noticed
+-- reads: application_path, blame, callback_cpu, callback_use, cpu_quota, cpu_user, noticed
 -- next: query scheduling --measure preemption --node {node}
 SELECT
     5 AS place,
@@ -12,37 +12,41 @@ SELECT
     w.path,
     arg_max_null(w.topic_name, w.mean_ns) AS topic_name,
     sum(w.mean_ns)::BIGINT AS harm_ns,
-    max(w.p95_ns) AS p95_ns,
+    arg_max(w.p95_ns, w.mean_ns) AS p95_ns,
     arg_max_null(w.lost, w.mean_ns) AS lost,
     arg_max_null(w.published, w.mean_ns) AS published,
+    arg_max_null(w.run_ns, w.mean_ns) AS run_ns,
+    arg_max_null(w.usual_ns, w.mean_ns) AS usual_ns,
+    arg_max_null(w.long_calls, w.mean_ns) AS long_calls,
+    arg_max_null(w.count, w.mean_ns) AS count,
+    arg_max_null(w.share, w.mean_ns) AS share,
     any_value(CASE WHEN q.node IS NULL AND p.reason IS NULL
         AND coalesce(p.used_cpus > l.of_callback, true) THEN p.program END) AS other,
     any_value(CASE WHEN q.node IS NULL THEN p.reason END) AS reason,
     any_value(CASE WHEN q.node IS NULL THEN p.used_cpus END) AS used_cpus,
     any_value(CASE WHEN q.node IS NULL THEN p.cpus ELSE q.cpus END) AS cpus,
     any_value(q.quota) AS quota,
-    any_value(q.throttled_count) AS count,
+    any_value(q.throttled_count) AS throttled_count,
     any_value(q.throttled_ns) AS throttled_ns,
     list(
         w.node || coalesce(w.callback, w.topic_name, '')
-        || CASE WHEN w.is_run THEN '' ELSE ' cpu' END
+        || CASE WHEN w.share IS NULL THEN ' cpu' ELSE '' END
     ) AS claims
 FROM (
     SELECT
         waiting_node AS node,
         waiting_callback AS callback,
-        path, topic_name, mean_ns, p95_ns, lost, published,
-        false AS is_run
+        path, topic_name, mean_ns, p95_ns, lost, published
     FROM blame
     WHERE is_cpu
-    UNION ALL
+    UNION ALL BY NAME
     SELECT
-        h.node, h.callback, h.path, h.topic_name,
-        h.harm_ns * (c.waiting_ns / c.run_ns),
-        h.p95_ns, h.lost, h.published, true
-    FROM harm AS h
-    JOIN callback_cpu AS c ON h.node = c.node AND h.callback = c.callback
-    WHERE c.waiting_ns > 0.5 * c.run_ns
+        node, callback, path, topic_name,
+        harm_ns * (waiting_ns / measured_ns) AS mean_ns,
+        p95_ns, lost, published, run_ns, usual_ns, long_calls, count,
+        waiting_ns / measured_ns AS share
+    FROM long_callback
+    WHERE waiting_ns > 0.5 * measured_ns
 ) AS w
 JOIN application_path AS a ON w.path = a.path
 LEFT JOIN callback_use AS u ON w.node = u.node AND w.callback = u.callback

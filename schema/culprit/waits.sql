@@ -12,6 +12,7 @@ SELECT
     b.mean_ns AS harm_ns,
     b.p95_ns, b.lost, b.published,
     s.count,
+    s.name = 'not_woken' AS is_supposed,
     CASE
         WHEN s.node IS NOT NULL THEN NULL
         WHEN b.waiting_callback IS NULL THEN 'callbacks'
@@ -24,13 +25,13 @@ LEFT JOIN callback_use AS u ON b.waiting_node = u.node AND b.waiting_callback = 
 LEFT JOIN (
     SELECT
         n.full_name AS node,
-        max(f.count) AS count
+        f.topic_name, f.name, f.count
     FROM main.finding AS f
-    JOIN main.node AS n ON f.process_id = n.process_id
-    WHERE f.name = 'busy_waiting' AND list_contains($runs, f.run_id)
-    GROUP BY n.full_name
+    JOIN main.node AS n
+        ON f.process_id = n.process_id AND coalesce(f.node_id = n.node_id, true)
+    WHERE f.name IN ('busy_waiting', 'not_woken') AND list_contains($runs, f.run_id)
 ) AS s
-    ON b.waiting_node = s.node
+    ON b.waiting_node = s.node AND coalesce(b.topic_name = s.topic_name, true)
 CROSS JOIN noticed AS l
 WHERE b.node IS NULL AND NOT b.is_cpu AND b.waiting_node IS NOT NULL
     AND b.mean_ns >= l.least_ns
@@ -45,5 +46,5 @@ WHERE b.node IS NULL AND NOT b.is_cpu AND b.waiting_node IS NOT NULL
         OR (b.lost >= l.lost AND b.lost >= l.of_messages * b.published)
     )
 QUALIFY row_number() OVER (
-    PARTITION BY b.waiting_node, b.topic_name ORDER BY b.mean_ns DESC, b.path
+    PARTITION BY b.waiting_node, b.topic_name ORDER BY b.mean_ns DESC, b.path, s.name DESC
 ) = 1

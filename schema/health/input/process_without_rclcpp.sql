@@ -7,8 +7,9 @@
 -- cause: It is written in Python (rclpy) or uses another client library. These have no tracepoints
 --     of their own.
 -- cure: Record Python nodes with msgflow record -- COMMAND, or start them with the folder that
---     msgflow record --print-python-path prints in front of PYTHONPATH (no rebuild). An
---     EventsExecutor of rclpy shows nothing all the same.
+--     msgflow record --print-python-path prints in front of PYTHONPATH (no rebuild). Where the
+--     detail says that Python is traced, nothing more is to be had: an EventsExecutor of rclpy
+--     shows nothing, and what a program takes by itself has no callback.
 -- next: query path-breakdown
 -- grain: one row per process
 -- severity: warning
@@ -61,9 +62,11 @@ SELECT
     printf('%s (%s)', n.nodes, l.label) AS subject,
     s.number AS count,
     printf('publications: %d, timers: %d, callbacks: none', s.number, coalesce(t.number, 0))
+    || CASE WHEN y.python_version IS NULL THEN '' ELSE ', though its Python is traced' END
         AS detail
 FROM sent AS s
 JOIN named AS n ON s.process_id = n.process_id
+JOIN staging.process AS y ON s.process_id = y.process_id
 LEFT JOIN timed AS t ON s.process_id = t.process_id
 JOIN process_label AS l ON s.process_id = l.process_id
 WHERE s.is_enabled AND NOT s.has_rclcpp

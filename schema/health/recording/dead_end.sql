@@ -40,15 +40,20 @@ output AS (
     GROUP BY node_id
 )
 SELECT
-    n.run_id, i.node_id, i.topic_name,
-    i.number - i.leading AS count,
+    n.run_id,
+    min(i.node_id) AS node_id,
+    i.topic_name,
+    sum(i.number - i.leading)::BIGINT AS count,
     printf(
         '%s%s on %s end at %s, which publishes %s',
-        CASE WHEN i.leading > 0 THEN printf('%d of ', i.number - i.leading) ELSE '' END,
-        derive.counted(i.number, 'message'), i.topic_name,
-        main.node_label(n.full_name, p.name, p.pid), o.published
+        CASE WHEN sum(i.leading) > 0 THEN printf('%d of ', sum(i.number - i.leading)::BIGINT)
+            ELSE '' END,
+        derive.counted(sum(i.number)::BIGINT, 'message'), i.topic_name,
+        main.node_label(n.full_name, p.name, p.pid), min(o.published)
     ) AS detail
 FROM input AS i
 JOIN output AS o ON i.node_id = o.node_id
 JOIN store.node AS n ON i.node_id = n.node_id
 JOIN store.process AS p ON n.process_id = p.process_id
+-- A node that is made again is one.
+GROUP BY n.run_id, n.full_name, p.name, p.pid, i.topic_name

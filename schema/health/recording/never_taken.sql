@@ -1,7 +1,7 @@
 -- title: A subscription that took no message of a publisher
 -- description: Publisher and subscription of a topic were both recorded, but not one message was
---     taken. These messages count as not connected (never_taken), not as lost. Topics of ROS itself
---     are not looked at.
+--     taken, nor by another subscription of the same node. These messages count as not connected
+--     (never_taken), not as lost. Topics of ROS itself are not looked at.
 -- cause: The two are in different ROS domains (ROS_DOMAIN_ID is not in a trace), their QoS does not
 --     match (a best-effort publisher, a reliable subscription), they never discovered each other,
 --     or the node of the subscription does not spin.
@@ -15,4 +15,4 @@ SELECT
     number AS count,
     printf('none of %s was taken', messages) AS detail
 FROM untaken_pair
-WHERE reason = 'never_taken'
+WHERE reason = 'never_taken' AND taken = 0

@@ -11,27 +11,13 @@
 -- when: store.undelivered WHERE reason IN ('not_delivered', 'lost_in_transport')
 WITH pair AS (
     SELECT
-        run_id, node_id, publishing_node_id, topic_name, subject,
+        run_id, topic_name, subject, taken,
+        min(node_id) AS node_id,
+        min(publishing_node_id) AS publishing_node_id,
         sum(number)::BIGINT AS untaken,
-        flatten(list(pairs)) AS pairs,
         sum(number) FILTER (reason IN ('not_delivered', 'lost_in_transport'))::BIGINT AS missing
     FROM untaken_pair
-    GROUP BY run_id, node_id, publishing_node_id, topic_name, subject
-),
-taken AS (
-    SELECT
-        publisher_id, subscription_id,
-        count(*) AS number
-    FROM store.link_transport
-    GROUP BY publisher_id, subscription_id
-),
-counted AS (
-    SELECT
-        p.* EXCLUDE (pairs),
-        sum(t.number)::BIGINT AS taken
-    FROM pair AS p
-    JOIN taken AS t ON list_contains(p.pairs, (t.publisher_id, t.subscription_id))
-    GROUP BY ALL
+    GROUP BY run_id, topic_name, subject, taken
 )
 SELECT
     run_id, node_id, publishing_node_id, topic_name, subject,
@@ -40,6 +26,6 @@ SELECT
         '%d of %d messages reached it (%.0f %%)',
         taken, taken + untaken, 100 * taken / (taken + untaken)
     ) AS detail
-FROM counted
+FROM pair
 -- A few may get lost at any time.
 WHERE missing >= 10 AND missing * 5 >= taken + missing

@@ -5,7 +5,7 @@
 --     age counts, since the next message replaces one that is lost.
 -- grain: one row per path, callback to blame, and callback that waits for it
 -- reads: application_path, breakdown, callback_job, callback_name, callback_use, callback_wait,
---     delivery, named_path
+--     delivery, held_message, named_path
 -- column: path VARCHAR [path]  The path
 -- column: node VARCHAR  Node to blame; NULL: not known
 -- column: callback VARCHAR  What triggers its callback; NULL: not known, or not traced
@@ -33,8 +33,9 @@ clock AS (
     JOIN main.host AS h ON p.host_id = h.host_id
     JOIN main.clock AS c ON h.clock_id = c.clock_id
 ),
+-- What a subscription gets from its process and from others runs as two callback objects.
 reader AS (
-    SELECT
+    SELECT DISTINCT
         h.path_id, h.hop, h.topic_name, h.subscription_id,
         coalesce(n.node, main.node_label(d.full_name, r.name, r.pid)) AS node,
         n.callback,
@@ -151,7 +152,9 @@ WHERE p.is_run
 GROUP BY p.path, p.node, p.what, u.callback
 UNION ALL
 SELECT
-    l.path, w.other_node, w.other_callback,
+    l.path,
+    coalesce(w.other_node, h.node),
+    coalesce(w.other_callback, h.callback),
     l.node, l.callback,
     coalesce(w.is_cpu, false),
     l.topic_name,
@@ -161,3 +164,6 @@ SELECT
     l.published
 FROM late AS l
 LEFT JOIN callback_wait AS w ON l.node = w.node AND l.callback = w.callback
+LEFT JOIN held_message AS h
+    ON w.other_node IS NULL AND w.is_cpu IS NOT TRUE
+    AND l.node = h.waiting_node AND l.topic_name = h.topic_name

@@ -15,7 +15,8 @@
 -- column: usual_ns BIGINT [ns]  Median time of a call
 -- column: p95_ns BIGINT [ns]  Median time of the calls that take three times as long, else 95 %
 --     take no longer
--- column: every BIGINT  One of so many calls is so long; NULL: all are alike
+-- column: long_calls BIGINT  So many calls are so long; NULL: all are alike
+-- column: calls BIGINT  All calls
 -- column: share DOUBLE  Share of all calls in the time that the callback takes, 0 to 1
 -- column: is_awaited BOOLEAN  A coroutine awaits it
 -- column: is_recorded BOOLEAN  Requests show it; else that its callback ran within this one
@@ -101,7 +102,8 @@ SELECT
     m.node, m.callback, m.service_name, m.server, m.server_callback, m.server_function,
     m.usual_ns,
     CASE WHEN m.long_calls >= 3 THEN m.long_ns ELSE m.p95_ns END AS p95_ns,
-    CASE WHEN m.long_calls >= 3 THEN round(m.calls / m.long_calls)::BIGINT END AS every,
+    CASE WHEN m.long_calls >= 3 THEN m.long_calls END AS long_calls,
+    m.calls,
     sum(m.total_ns) OVER (PARTITION BY m.node, m.callback)
     / greatest(u.mean_ns * u.instances + coalesce(m.awaited_ns, 0), 1) AS share,
     m.is_awaited, m.is_recorded

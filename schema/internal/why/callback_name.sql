@@ -24,9 +24,10 @@ SELECT
     l.label AS callback,
     -- A Python function has its module in front, a C++ function arguments and template parameters,
     -- one within the other. Of a bound method C++ keeps only the class, of a lambda where it
-    -- stands.
+    -- stands; that of Python is told by what triggers it.
     CASE
         WHEN b.is_job THEN NULL
+        WHEN contains(f.symbol, '<lambda>') THEN NULL
         WHEN regexp_matches(f.symbol, '^[^\s:(<]+:[^:]')
             THEN replace(regexp_replace(f.symbol, '^[^:]*:', ''), '.<locals>', '')
         WHEN NOT regexp_matches(f.symbol, '::\*|\{lambda') THEN nullif(trim(list_reduce(

@@ -1,9 +1,10 @@
 -- title: What callbacks take of their threads
 -- description: How long callbacks run and how often. Those of one node that the same thing triggers
 --     are one, also if the node was started again. The steps of a coroutine are one instance,
---     without the time for which it awaits.
+--     without the time for which it awaits. What a node takes longer for right after it was started
+--     again belongs to that.
 -- grain: one row per node and callback
--- reads: callback_name, noticed
+-- reads: callback_name, node_restart, noticed
 -- column: node VARCHAR  Node
 -- column: callback VARCHAR  What triggers it
 -- column: function VARCHAR  Its function, without its module; NULL: not known
@@ -25,9 +26,12 @@ WITH instance AS (
         sum(i.end_ns - i.start_ns)::BIGINT AS run_ns
     FROM main.callback_instance AS i
     JOIN callback_name AS n ON i.callback_id = n.callback_id
+    CROSS JOIN noticed AS l
+    LEFT JOIN node_restart AS r ON n.node = r.node
     WHERE list_contains($runs, i.run_id)
         AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
         AND i.end_ns IS NOT NULL
+        AND coalesce(i.start_ns NOT BETWEEN r.begun_ns AND r.begun_ns + l.start_ns, true)
     GROUP BY coalesce(i.continues_id, i.callback_instance_id), n.node, n.callback
 ),
 callback AS (

@@ -6,6 +6,7 @@
 -- column: node VARCHAR  Node
 -- column: gap_ns BIGINT [ns]  From the last event of its process until its next callback ran, or
 --     else until it was created again
+-- column: begun_ns BIGINT [epoch ns]  When it ran again
 -- column: topic_name VARCHAR  The topic that it missed most on; NULL: it misses none
 -- column: lost BIGINT  Messages on that topic meanwhile
 -- column: published BIGINT  All messages on it
@@ -50,7 +51,7 @@ missed AS (
 SELECT
     g.node,
     g.begun_ns - g.ended_ns AS gap_ns,
-    m.topic_name, m.lost, m.published
+    g.begun_ns, m.topic_name, m.lost, m.published
 FROM gap AS g
 LEFT JOIN missed AS m ON g.node = m.node AND g.ended_ns = m.ended_ns
 QUALIFY row_number() OVER (

@@ -6,6 +6,7 @@
 -- column: of_period DOUBLE  Share of the period of a callback: more leaves no time for others
 -- column: of_path DOUBLE  Share of the latency of a path: less changes little
 -- column: of_callback DOUBLE  Share of the time of a callback: what takes less is no reason for it
+-- column: nearly_all DOUBLE  Share of what happens each time: the rest has other reasons
 -- column: lost BIGINT  Messages lost: fewer are chance
 -- column: of_messages DOUBLE  Share of the messages of a topic that are lost
 -- column: load DOUBLE  Share of its time that a thread is asked for: above it queues grow
@@ -17,6 +18,7 @@ SELECT
     0.8::DOUBLE AS of_period,
     0.1::DOUBLE AS of_path,
     0.3::DOUBLE AS of_callback,
+    0.95::DOUBLE AS nearly_all,
     3::BIGINT AS lost,
     0.02::DOUBLE AS of_messages,
     0.9::DOUBLE AS load,

@@ -6,6 +6,7 @@
 -- column: executor_id BIGINT  The executor
 -- column: node VARCHAR  Node of the callback
 -- column: callback VARCHAR  What triggers it
+-- column: per_take DOUBLE  Messages that come for each that it takes; NULL: not known
 -- column: demand DOUBLE  Share of one thread that it needs; of several objects, each
 -- column: load DOUBLE  Share that all callbacks need, of all threads
 -- column: largest DOUBLE  The largest one of a callback, of all threads
@@ -14,10 +15,12 @@ WITH member AS (
     SELECT DISTINCT w.executor_id, w.callback_id
     FROM explained_wait AS w
 ),
+-- One may be on its way when the recording ends.
 heard AS (
     SELECT
         subscription_id,
-        sum(delivered + dropped) / nullif(sum(delivered), 0) AS per_take
+        sum(delivered + dropped + greatest(cut_by_recording - 1, 0)) / nullif(sum(delivered), 0)
+            AS per_take
     FROM delivery
     GROUP BY subscription_id
 ),
@@ -32,6 +35,7 @@ asked AS (
             ),
             0
         ) AS demand,
+        max(h.per_take) AS per_take,
         count(DISTINCT m.callback_id) AS callbacks
     FROM member AS m
     JOIN callback_name AS n ON m.callback_id = n.callback_id
@@ -42,7 +46,7 @@ asked AS (
     GROUP BY m.executor_id, n.node, n.callback
 )
 SELECT
-    a.executor_id, a.node, a.callback,
+    a.executor_id, a.node, a.callback, a.per_take,
     a.each_demand AS demand,
     sum(a.demand) OVER each / s.threads AS load,
     a.largest_demand / s.threads AS largest,

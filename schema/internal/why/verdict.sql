@@ -41,7 +41,7 @@ chosen AS (
         main.duration_text(run_ns) AS run,
         main.duration_text(usual_ns) AS usual,
         CASE
-            WHEN every > 1 THEN printf(', 1 of %d times', every)
+            WHEN long_calls > 0 THEN printf(' in %d of %d calls', long_calls, count)
             -- Of so few, 95 % are all.
             WHEN run_ns > usual_ns AND count < 20 THEN printf(' (longest of %d)', count)
             WHEN run_ns > usual_ns THEN ' (p95)'
@@ -67,42 +67,49 @@ said AS (
         *,
         CASE kind
             WHEN 'action' THEN printf(
-                '%s %s for %s', long_name,
-                CASE WHEN waiting_callback IS NULL THEN 'executes goals'
+                '%s %s for %s%s', long_name,
+                CASE WHEN waiting_callback IS NULL THEN 'executes a goal'
                     ELSE 'blocks its executor' END,
-                run
+                run, at_times
             )
             WHEN 'service' THEN CASE WHEN is_awaited IS NULL
-                THEN printf('%s takes %s%s, and data of %s wait', long_name, run, at_times, other)
+                THEN printf(
+                    '%s takes %s%s, and data of %s wait for it', long_name, run, at_times, other
+                )
             ELSE printf(
                 '%s %s %s for %s%s', name,
-                CASE WHEN is_awaited THEN 'awaits' ELSE 'calls' END, service_name, run, at_times
+                CASE WHEN is_awaited THEN 'awaits' ELSE 'waits for' END, service_name, run, at_times
             ) || coalesce(printf(' (%s of %s)', other_name, other), '') END
             WHEN 'overload' THEN printf(
-                'its thread is asked for %.0f %%: %d like %s, %s each %s', 100 * load, count, name,
-                run, main.duration_text(period_ns)
+                'its thread is asked for %.0f %% of its time: %d callbacks like %s, %s every %s',
+                100 * load, count, name, run, main.duration_text(period_ns)
             )
             WHEN 'burst' THEN printf(
-                '%s sends up to %d messages on %s at once, each %s',
+                '%s sends up to %d messages on %s at once, every %s',
                 coalesce(long_name, 'it'), count, topic, main.duration_text(period_ns)
             )
             WHEN 'computes' THEN printf('%s computes %s%s', long_name, run, at_times)
             WHEN 'garbage_collection' THEN printf(
-                '%s collects garbage %.0f %% of %s%s', long_name, 100 * share, run, at_times
+                '%s collects garbage for %.0f %% of %s%s', long_name, 100 * share, run, at_times
             )
             WHEN 'interpreter' THEN printf(
-                '%s waits while another thread of its process computes, %.0f %% of %s%s',
+                '%s waits while another thread of its process computes, for %.0f %% of %s%s',
                 long_name, 100 * share, run, at_times
             )
             WHEN 'sleeps'
-                THEN printf('%s sleeps %.0f %% of %s%s', long_name, 100 * share, run, at_times)
-            WHEN 'disk' THEN printf('%s waits for the disk, for %s%s', long_name, run, at_times)
+                THEN printf('%s sleeps for %.0f %% of %s%s', long_name, 100 * share, run, at_times)
+            WHEN 'disk' THEN printf(
+                '%s waits for the disk, for %.0f %% of %s%s', long_name, 100 * share, run, at_times
+            )
             WHEN 'lock' THEN printf(
-                '%s waits %s for a lock that %s holds', name, run, other_name
+                '%s waits %s (p95) for a lock that %s holds', name, run, other_name
             )
             WHEN 'no_cpu' THEN printf(
-                '%s has no CPU for %s (p95)%s', coalesce(long_name, 'its thread'),
-                main.duration_text(p95_ns),
+                '%s %s%s', coalesce(long_name, 'its thread'),
+                coalesce(
+                    printf('has no CPU for %.0f %% of %s%s', 100 * share, run, at_times),
+                    printf('waits %s (p95) for a CPU', main.duration_text(p95_ns))
+                ),
                 coalesce(
                     CASE WHEN quota IS NOT NULL THEN coalesce(
                         printf(': its quota of %g CPUs stops it', cpus), ': its quota stops it'
@@ -122,23 +129,27 @@ said AS (
                 coalesce(printf(' of %s', topic_name), ''), main.duration_text(period_ns)
             )
             WHEN 'restart' THEN printf('ended, and ran again after %s', run)
-            || coalesce(printf(': %d of %d messages on %s lost', lost, published, topic_name), '')
+            || coalesce(
+                printf(': %d of %d messages on %s were lost', lost, published, topic_name), ''
+            )
             WHEN 'never_matched' THEN printf(
-                'took none of %d messages on %s%s: likely QoS or domain', published, topic,
-                coalesce(printf(' of %s', other), '')
+                'received none of the %d messages on %s%s: likely QoS or %s', published, topic,
+                coalesce(printf(' from %s', other), ''),
+                CASE WHEN is_supposed THEN 'discovery' ELSE 'domain' END
             )
             WHEN 'late_start' THEN printf(
-                'started %s after the others, missed %d of %d messages on %s', run, lost,
+                'started %s after the others and missed %d of %d messages on %s', run, lost,
                 published, topic
             )
             WHEN 'lost'
-                THEN printf('%d of %d messages on %s are lost on the way', lost, published, topic)
+                THEN printf('%d of %d messages on %s were lost on the way', lost, published, topic)
             WHEN 'waits' THEN CASE
                 WHEN p95_ns > 0 THEN printf(
                     'messages on %s wait %s (p95)%s', topic, main.duration_text(p95_ns),
-                    CASE WHEN count IS NULL THEN '' ELSE ' while its executor spins' END
+                    CASE WHEN is_supposed THEN ' for the next one: its executor is not woken'
+                        WHEN count IS NULL THEN '' ELSE ' while its executor spins' END
                 )
-                ELSE printf('%d of %d messages on %s are overwritten', lost, published, topic)
+                ELSE printf('%d of %d messages on %s were overwritten', lost, published, topic)
             END
             WHEN 'callback' THEN printf(
                 '%s takes %s%s', coalesce(long_name, printf('between its input and %s, it', topic)),
@@ -158,7 +169,7 @@ said AS (
                     list_filter(
                         [
                             CASE WHEN kind IN ('callback', 'computes', 'sleeps', 'disk')
-                                AND every > 1 THEN printf('usually it takes %s', usual) END,
+                                AND long_calls > 0 THEN printf('usually it takes %s', usual) END,
                             printf(
                                 '%s wakes it',
                                 CASE woken_by
@@ -168,25 +179,37 @@ said AS (
                                     WHEN 'softirq' THEN 'the network or a device'
                                 END
                             ),
+                            printf(
+                                'it took %s before %s got messages on %s, from %.3g s on',
+                                main.duration_text(before_ns), reader, reader_topic, since_ns / 1e9
+                            ),
                             CASE WHEN kind = 'callback' THEN printf(
-                                'on a CPU for %.0f %% of it, ready without one %.0f %%',
+                                'on a CPU for %.0f %% of it, ready without one for %.0f %%',
                                 100 * running_ns / measured_ns, 100 * waiting_ns / measured_ns
                             ) END,
                             printf('%s used %.1f of %d CPUs', other, used_cpus, cpus::INTEGER),
                             printf(
-                                'throttled %d times, for %s, as %s', count,
+                                'throttled %d times, for %s in all, as %s', throttled_count,
                                 main.duration_text(throttled_ns), quota
                             ),
-                            CASE WHEN load >= 0.9 AND kind <> 'overload'
-                                THEN printf('its thread is asked for %.0f %%', 100 * load) END,
-                            CASE WHEN waiting_callback IS NOT NULL
-                                THEN printf('%s of %s waits for it', waiting_callback, waiting_node)
+                            CASE WHEN load >= 0.9 AND kind <> 'overload' THEN printf(
+                                'its thread is asked for %.0f %% of its time', 100 * load
+                            ) END,
+                            printf(
+                                '%.3g Hz come in, %.3g Hz are taken', 1e9 * per_take / period_ns,
+                                1e9 / period_ns
+                            ),
+                            CASE
+                                WHEN is_held THEN printf('messages on %s come when it ends', topic)
+                                WHEN waiting_callback IS NOT NULL THEN printf(
+                                    '%s of %s waits for it', waiting_callback, waiting_node
+                                )
                             END,
                             CASE WHEN lost > 0 AND kind NOT IN (
                                 'restart', 'never_matched', 'late_start', 'lost'
-                            )
-                                THEN printf('%d of %d messages on %s overwritten', lost, published,
-                                    topic) END,
+                            ) THEN printf(
+                                '%d of %d messages on %s were overwritten', lost, published, topic
+                            ) END,
                             CASE WHEN is_supposed AND kind = 'lock'
                                 THEN 'as far as times show: it goes on when that one ends' END,
                             CASE WHEN is_supposed AND kind = 'service'
@@ -212,7 +235,7 @@ said AS (
 ),
 longest AS (
     SELECT
-        a.path, a.p95_ns, b.what, b.node,
+        a.path, a.p95_ns, b.part, b.what, b.node,
         b.p95_ns AS longest_ns
     FROM application_path AS a
     JOIN breakdown AS b ON a.path = b.path
@@ -238,7 +261,8 @@ SELECT
         '%s: %s', node,
         -- What triggers the callback stands there where the line has room for it.
         CASE
-            WHEN length(node) + length(what) > 98 THEN replace(what, long_name, name)
+            WHEN length(node) + length(what) > 98
+                THEN coalesce(replace(what, long_name, name), what)
             ELSE what
         END
     ) AS headline,
@@ -256,11 +280,16 @@ SELECT
             ),
             CASE
                 WHEN l.node = 'between nodes' THEN printf(
-                    'longest takes the way on %s: %s (p95)', l.what,
+                    'the way on %s takes longest: %s (p95)', l.what,
+                    main.duration_text(l.longest_ns)
+                )
+                -- Without a traced callback its topic is what it publishes.
+                WHEN l.part = 'callback' AND starts_with(l.what, '/') THEN printf(
+                    '%s takes longest, between its input and %s: %s (p95)', l.node, l.what,
                     main.duration_text(l.longest_ns)
                 )
                 ELSE printf(
-                    'longest takes %s of %s: %s (p95)', l.what, l.node,
+                    '%s of %s takes longest: %s (p95)', l.what, l.node,
                     main.duration_text(l.longest_ns)
                 )
             END

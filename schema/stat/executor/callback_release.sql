@@ -1,6 +1,7 @@
 -- description: Since when a callback instance can have been due (its release), and by when it was
 --     due for certain. A message can have been due since the end of its publication, or since its
---     stamp where the two clocks cannot be compared; a request since it was sent. A timer is due
+--     stamp where the two clocks cannot be compared; a request since it was sent. What a ring
+--     buffer keeps was due for certain when it was published. A timer is due
 --     as derive.timer_due says, in any case after its previous call. All times are those of the
 --     executor's clock; times of other clocks are brought to it. `returned_ns`: its own thread had
 --     published the message by then.
@@ -36,7 +37,7 @@ started AS (
 clock AS MATERIALIZED (FROM derive.process_clock),
 message AS (
     SELECT
-        t.take_id, t.taken_ns, s.created_ns,
+        t.take_id, s.created_ns,
         CASE
             WHEN l.publication_id IS NULL AND t.source_timestamp_ns <= t.taken_ns
                 THEN t.source_timestamp_ns
@@ -45,6 +46,8 @@ message AS (
             )
         END AS origin_ns,
         CASE WHEN l.publication_id IS NULL THEN 'stamp' ELSE 'publication' END AS since,
+        CASE WHEN t.method = 'ring_buffer' THEN coalesce(origin_ns, t.taken_ns) ELSE t.taken_ns END
+            AS latest_ns,
         CASE WHEN b.thread_id = t.thread_id THEN t.taken_ns - d.waited_ns END AS returned_ns
     FROM store.take AS t
     JOIN clock AS tc ON t.process_id = tc.process_id
@@ -81,7 +84,7 @@ SELECT
         ELSE m.origin_ns
     END AS origin_ns,
     coalesce(m.created_ns, i.called_ns) AS subscribed_ns,
-    least(i.latest_ns, q.taken_ns, m.taken_ns, i.start_ns) AS latest_ns,
+    least(i.latest_ns, q.taken_ns, m.latest_ns, i.start_ns) AS latest_ns,
     m.returned_ns
 FROM started AS i
 LEFT JOIN message AS m ON i.take_id = m.take_id

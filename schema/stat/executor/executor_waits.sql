@@ -106,7 +106,9 @@ measured AS (
         -- From the end of one wait to the begin of the next, which found the input.
         CASE WHEN r.thread_count = 1 AND NOT r.is_loss_affected
             THEN r.wait_start_ns - greatest(r.earliest_ns, r.previous_wait_end_ns)
-                - (b.until_latest_ns - b.until_earliest_ns) END AS away_ns
+                - CASE WHEN r.latest_ns < r.wait_start_ns THEN b.until_start_ns
+                    ELSE b.until_latest_ns END
+                + b.until_earliest_ns END AS away_ns
     FROM ready AS r
     JOIN busy AS b ON r.callback_instance_id = b.callback_instance_id
     LEFT JOIN blocked AS x ON r.callback_instance_id = x.callback_instance_id
