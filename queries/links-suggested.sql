@@ -39,7 +39,8 @@ WITH named_node AS (
 input_run AS (
     SELECT
         s.node_id, s.subscription_id, s.topic_name, i.callback_instance_id, i.start_ns,
-        coalesce(i.end_ns, i.start_ns) AS end_ns
+        coalesce(i.end_ns, i.start_ns) AS end_ns,
+        coalesce(contains(c.symbol, 'message_filters::'), false) AS is_filtered
     FROM main.subscription AS s
     JOIN named_node AS n ON s.node_id = n.node_id
     JOIN main.callback AS c ON s.subscription_id = c.subscription_id
@@ -58,6 +59,7 @@ caused AS (
 input AS (
     SELECT
         r.node_id, r.subscription_id, r.topic_name,
+        bool_and(r.is_filtered) AS is_filtered,
         count(DISTINCT r.callback_instance_id) AS run_count,
         count(DISTINCT c.callback_instance_id) AS leading_count
     FROM input_run AS r
@@ -175,19 +177,23 @@ synchronous AS (
         min(m.met_count) AS met_count,
         coalesce(any_value(p.patient_count), 0) AS patient_count,
         CASE
+            WHEN bool_and(i.is_filtered) AND min(m.own_count) = 0 THEN 'approximate_sync'
             WHEN any_value(p.patient_count) > any_value(m.firing_count) * (1 - $min_share)
                 THEN 'approximate_sync'
             ELSE 'partial_sync'
-        END AS kind
+        END AS kind,
+        bool_and(i.is_filtered) AS is_filtered
     FROM met AS m
     JOIN input AS i ON m.subscription_id = i.subscription_id
     LEFT JOIN patient AS p ON m.publisher_id = p.publisher_id
     WHERE m.met_count >= m.firing_count * $min_share
         -- An output that waits for a message is published by the run that gets it. Where no output
-        -- waited for any message of an input, the latest one counts, as for periodic_async.
+        -- waited for any message of an input, the latest one counts, as for periodic_async, unless
+        -- the callbacks are those of a filter.
         AND (
             m.own_count > 0
-            OR i.leading_count = 0 AND p.patient_count > m.firing_count * (1 - $min_share)
+            OR i.leading_count = 0
+            AND (i.is_filtered OR p.patient_count > m.firing_count * (1 - $min_share))
         )
     GROUP BY m.node_id, m.publisher_id, m.output_topic
     HAVING count(DISTINCT i.topic_name) > 1 AND any_value(m.firing_count) >= 3
@@ -204,14 +210,18 @@ partial AS (
             min(firing_count),
             string_agg(DISTINCT output_topic, ' and ' ORDER BY output_topic),
             CASE
-                WHEN kind = 'approximate_sync' THEN
+                WHEN kind = 'approximate_sync' AND min(patient_count) > 0 THEN
                     printf(' %d waited for a further message;', min(patient_count))
                 ELSE ''
             END,
             min(evidence)
         ) AS evidence,
-        CASE WHEN kind = 'approximate_sync' THEN
-            'it is supposed that message_filters (ApproximateTime) chose the messages'
+        CASE
+            WHEN bool_and(is_filtered) THEN
+                'its callbacks are of message_filters: approximate_sync for ApproximateTime, '
+                || 'partial_sync for TimeSynchronizer'
+            WHEN kind = 'approximate_sync' THEN
+                'it is supposed that message_filters (ApproximateTime) chose the messages'
         END AS doubt
     FROM synchronous
     GROUP BY node_id, kind, inputs

@@ -4,8 +4,9 @@
 --     from when the timer was due to the start of the callback: it is due at the first moment after
 --     its previous call that is a whole number of periods after its creation. So a call that is a
 --     period late or more replaces those that were due meanwhile (missed), and is followed by one
---     sooner than usual (bunched). A timer waits for what its executor runs, else for the executor
---     itself, or for a CPU. Calls after a gap of the trace are not counted.
+--     sooner than usual (bunched). An events executor queues calls: none is missed. A timer waits
+--     for what its executor runs, else for the executor itself, or for a CPU. Calls after a gap of
+--     the trace are not counted.
 -- grain: one row per timer, called or not; one for all timers that a node made of one function and
 --     period
 -- column: run_id
@@ -14,7 +15,8 @@
 -- column: objects BIGINT            Timers that it stands for
 -- column: period_ns BIGINT [ns]     Period asked for; empty: not in the trace
 -- column: period_median_ns
--- column: rate_hz DOUBLE [Hz]       Calls per second, between the first and the last
+-- column: rate_hz DOUBLE [Hz]       Calls per second, from the first to the last
+-- column: recording_rate_hz
 -- column: count BIGINT              Calls that began in the time window
 -- column: missed BIGINT             Calls that did not happen, since the one before was late by
 --     whole periods
@@ -44,7 +46,8 @@
 -- column: callback_id BIGINT        Identity of the callback, of the first of several
 -- column: is_internal
 -- brief: node, callback, count, missed, lateness_p99_ns, lateness_max_ns, off_grid, jitter_p99_ns,
---     meanwhile, objects, busy_share, run_queue_share, lateness_median_ns, rate_hz, bunched
+--     meanwhile, objects, busy_share, run_queue_share, lateness_median_ns, rate_hz,
+--     recording_rate_hz, bunched
 -- note: callbacks
 WITH asked AS (
     SELECT
@@ -85,6 +88,9 @@ late AS MATERIALIZED (
     SELECT
         i.callback_id, i.callback_instance_id, i.thread_id, i.start_ns,
         w.wait_ns AS lateness_ns,
+        lead(w.origin_ns) OVER (
+            PARTITION BY w.callback_id ORDER BY i.start_ns, i.callback_instance_id
+        ) - w.origin_ns AS until_next_ns,
         w.busy_max_ns AS busy_ns,
         w.meanwhile_callback_ids, w.meanwhile_ns,
         w.run_queue_ns + w.preempted_ns AS queue_ns
@@ -140,7 +146,11 @@ delayed AS (
         l.callback_id,
         count(*) AS known,
         quantile_disc(l.lateness_ns, [0.5, 0.95, 0.99, 1]) AS lateness,
-        sum(l.lateness_ns // nullif(a.period_ns, 0))::BIGINT AS missed,
+        -- Moments that passed meanwhile, but for those of calls that an events executor queued.
+        sum(least(
+            l.lateness_ns // a.period_ns,
+            (l.until_next_ns + a.period_ns // 2) // nullif(a.period_ns, 0) - 1
+        ))::BIGINT AS missed,
         sum(l.busy_ns) / nullif(sum(l.lateness_ns), 0) AS busy_share,
         sum(l.queue_ns) / nullif(sum(l.lateness_ns), 0) AS run_queue_share
     FROM late AS l
@@ -153,6 +163,8 @@ SELECT
     a.objects, a.period_ns,
     u.median_ns AS period_median_ns,
     c.rate_hz,
+    c.count * 1e9 / nullif(least(r.end_ns, $end_ns) - greatest(r.start_ns, $start_ns), 0)
+        AS recording_rate_hz,
     coalesce(c.count, 0) AS count,
     d.missed, k.bunched,
     k.jitter[1] AS jitter_median_ns,
@@ -181,6 +193,7 @@ SELECT
     coalesce(c.loss_affected, 0) AS loss_affected,
     a.symbol, a.timer_id, a.callback_id, n.is_internal
 FROM asked AS a
+JOIN main.run AS r ON a.run_id = r.run_id
 JOIN main.callback_label AS n ON a.callback_id = n.callback_id
 LEFT JOIN counted AS c ON a.callback_id = c.callback_id
 LEFT JOIN usual AS u ON a.callback_id = u.callback_id

@@ -1,11 +1,13 @@
 -- title: Publication rates and periods
 -- description: How many messages each publisher published, at what rate, and how regularly. The
---     rate is taken from the first to the last publication in the time window.
+--     rate is that of its life, from the first to the last publication in the time window; that of
+--     the whole recording is less where it begins late or stops.
 -- grain: one row per publisher that published
 -- column: run_id, topic_name
 -- column: publisher VARCHAR [node]  Node that published
 -- column: count BIGINT              Publications in the time window
--- column: rate_hz DOUBLE [Hz]       Publications per second
+-- column: rate_hz DOUBLE [Hz]       Publications per second, from the first to the last
+-- column: recording_rate_hz
 -- column: period_min_ns BIGINT [ns]     Shortest time from one publication to the next
 -- column: period_median_ns BIGINT [ns]  Median time from one publication to the next
 -- column: period_p95_ns BIGINT [ns]     95 % of these times are at most this
@@ -13,8 +15,8 @@
 -- column: period_deviation_ns BIGINT [ns]  Standard deviation of these times (jitter)
 -- column: publisher_id BIGINT       Identity of the publisher
 -- column: is_internal
--- brief: topic_name, publisher, rate_hz, period_median_ns, period_deviation_ns, period_max_ns,
---     count, period_p95_ns, period_min_ns
+-- brief: topic_name, publisher, rate_hz, recording_rate_hz, period_median_ns, period_deviation_ns,
+--     period_max_ns, count, period_p95_ns, period_min_ns
 WITH published AS (
     SELECT
         run_id, publisher_id, start_ns,
@@ -42,11 +44,15 @@ measured AS (
 SELECT
     m.run_id, b.topic_name,
     main.node_label(n.full_name, p.name, p.pid) AS publisher,
-    m.count, m.rate_hz, m.period_min_ns,
+    m.count, m.rate_hz,
+    m.count * 1e9 / nullif(least(r.end_ns, $end_ns) - greatest(r.start_ns, $start_ns), 0)
+        AS recording_rate_hz,
+    m.period_min_ns,
     m.quantiles[1] AS period_median_ns,
     m.quantiles[2] AS period_p95_ns,
     m.period_max_ns, m.period_deviation_ns, m.publisher_id, b.is_internal
 FROM measured AS m
+JOIN main.run AS r ON m.run_id = r.run_id
 JOIN main.publisher AS b ON m.publisher_id = b.publisher_id
 JOIN main.process AS p ON b.process_id = p.process_id
 LEFT JOIN main.node AS n ON b.node_id = n.node_id

@@ -175,6 +175,8 @@
 -- column: publisher_count BIGINT  Publishers
 -- column: publisher_id BIGINT  Last publisher; below 0: not traced
 -- column: reason VARCHAR  Why the other side is missing
+-- column: recording_rate_hz DOUBLE [Hz]  Per second of the whole recording, or of the time window:
+--     less than the other rate if it begins late, or stops
 -- column: request_id BIGINT  Request whose response the callback of the part waits for
 -- column: root_at BIGINT [ns since origin]  Start of the root
 -- column: root_id BIGINT  Identity of the root

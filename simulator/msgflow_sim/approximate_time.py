@@ -1,7 +1,7 @@
 """Filter of messages that makes sets of those whose headers are closest in time.
 
-It does what the policy ApproximateTime of message_filters does, with its usual settings and queues
-that are long enough: no limits, and a penalty of a tenth for sets that end later.
+It does what the policy ApproximateTime of message_filters does. Its usual settings: no limits but
+that of the queues, and a penalty of a tenth for sets that end later.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ class _Queue(Generic[Item]):
 
     waiting: deque[tuple[int, Item]] = field(default_factory=deque)
     passed: list[tuple[int, Item]] = field(default_factory=list)
+    has_dropped: bool = False
 
     def pass_first(self) -> None:
         self.passed.append(self.waiting.popleft())
@@ -42,32 +43,62 @@ class _Candidate(Generic[Item]):
 
 
 class ApproximateTime(Generic[Item]):
-    """Queues of several inputs, and the search for the next set."""
+    """Queues of several inputs, and the search for the next set.
 
-    def __init__(self, input_count: int) -> None:
+    `queue_size`: messages that wait of an input at the most; `longest_ns`: how far the stamps of a
+    set may be apart; `apart_ns`: the stamps of an input differ by at least this.
+    """
+
+    def __init__(
+        self,
+        input_count: int,
+        queue_size: int | None = None,
+        longest_ns: int | None = None,
+        apart_ns: int = 0,
+    ) -> None:
         self._queues: Sequence[_Queue[Item]] = tuple(_Queue() for _ in range(input_count))
         self._candidate: _Candidate[Item] | None = None
         # Input and stamp of the message that is in all sets which are compared.
         self._pivot = (0, 0)
+        self._queue_size = queue_size
+        self._longest_ns = longest_ns
+        self._apart_ns = apart_ns
 
     def add(self, number: int, stamp: int, item: Item) -> list[tuple[Item, ...]]:
         """A message of an input has come; returns the sets that are known now, first one first."""
-        waiting = self._queues[number].waiting
-        waiting.append((stamp, item))
-        sets: list[tuple[Item, ...]] = []
+        queue = self._queues[number]
+        queue.waiting.append((stamp, item))
         # A longer queue was not what the search waited for.
-        if len(waiting) == 1:
-            while all(queue.waiting for queue in self._queues):
-                done = self._search()
-                if done is not None:
-                    sets.append(done)
+        sets = self._sets() if len(queue.waiting) == 1 else []
+        if self._queue_size and len(queue.waiting) + len(queue.passed) > self._queue_size:
+            for each in self._queues:
+                each.recall()
+            queue.waiting.popleft()
+            queue.has_dropped = True
+            if self._candidate is not None:
+                self._candidate = None
+                sets += self._sets()
+        return sets
+
+    def _sets(self) -> list[tuple[Item, ...]]:
+        sets: list[tuple[Item, ...]] = []
+        while all(queue.waiting for queue in self._queues):
+            done = self._search()
+            if done is not None:
+                sets.append(done)
         return sets
 
     def _search(self) -> tuple[Item, ...] | None:
         """Look at the set of the first messages; returns the best one if none can be better."""
         start, first, end, last = self._ends(lambda queue: queue.waiting[0][0])
+        for number, queue in enumerate(self._queues):
+            queue.has_dropped = queue.has_dropped and number == last
         best = self._candidate
         if best is None:
+            is_long = self._longest_ns is not None and end - start > self._longest_ns
+            if is_long or self._queues[last].has_dropped:
+                self._queues[first].waiting.popleft()
+                return None
             self._pivot = (last, end)
             best = self._choose(start, end)
         elif _END * (end - best.end) < _START * (start - best.start):
@@ -104,7 +135,9 @@ class ApproximateTime(Generic[Item]):
         while True:
             start, first, end, _ = self._ends(
                 lambda queue: (
-                    queue.waiting[0][0] if queue.waiting else max(queue.passed[-1][0], pivot)
+                    queue.waiting[0][0]
+                    if queue.waiting
+                    else max(queue.passed[-1][0] + self._apart_ns, pivot)
                 )
             )
             is_best = self._is_best(best, end)

@@ -16,7 +16,7 @@ from support.thorough import few
 
 from msgflow_sim.approximate_time import ApproximateTime
 
-SOURCE, NODE = Thread(100), Thread(200)
+SOURCE, RELAY, NODE = Thread(100), Thread(150), Thread(200)
 OUTPUT = 0x31
 PERIODS = (10, 14, 20, 20, 33, 50, 90)
 Messages = list[tuple[int, int]]
@@ -45,7 +45,11 @@ def messages(random: Random, inputs: int) -> Messages:
 
 
 def record(
-    arrived: Messages, *, silent: float = 0, random: Random | None = None
+    arrived: Messages,
+    *,
+    silent: float = 0,
+    random: Random | None = None,
+    filters: ApproximateTime[int] | None = None,
 ) -> tuple[RosSystem, dict[int, list[int]]]:
     """The events of such a system, and of each publication the callbacks of its set."""
     inputs = 1 + max(number for number, _ in arrived)
@@ -59,7 +63,7 @@ def record(
         system.subscription(NODE, 0x11 + number, f"/in{number}", callback=0xC1 + number)
     system.publisher(NODE, OUTPUT, "/out")
     system.annotate(NODE, "approximate_sync", [0x11 + n for n in range(inputs)], [OUTPUT])
-    filters: ApproximateTime[int] = ApproximateTime(inputs)
+    filters = filters or ApproximateTime(inputs)
     sets: dict[int, list[int]] = {}
     outputs = iter(range(10**12, 2 * 10**12))
     for number, stamp in arrived:
@@ -116,5 +120,84 @@ def test_a_filter_whose_sets_are_not_all_published(
     system, sets = record(messages(random, inputs), silent=0.4, random=random)
     links = found(analysis, system)
     assert links.keys() <= sets.keys()
+    wrong = {each for each, (used, count) in links.items() if count == 1 and used != sets[each]}
+    assert wrong == set()
+
+
+def stamped_early(random: Random, inputs: int) -> tuple[RosSystem, dict[int, list[int]]]:
+    """Callbacks stamp headers when they begin, or later; some nodes pass on those of others."""
+    system = RosSystem()
+    for thread, name in ((SOURCE, "source"), (RELAY, "relay"), (NODE, "filter")):
+        system.context(thread)
+        system.node(thread, 0x1, name)
+    published = []
+    for number in range(inputs):
+        period = random.choice(PERIODS) * 1_000_000
+        jitter = random.choice((10_000, 1_000_000, period // 5))
+        work = random.choice((50_000, 1_000_000, 5_000_000))
+        delay = random.choice((100_000, 1_000_000, 5_000_000))
+        is_relayed = random.random() < 0.5
+        system.timer(SOURCE, 0x400 + number, 0x500 + number, period=period)
+        system.publisher(SOURCE, 0x21 + number, f"/{'raw' if is_relayed else 'in'}{number}")
+        if is_relayed:
+            system.subscription(RELAY, 0x311 + number, f"/raw{number}", callback=0x3C1 + number)
+            system.publisher(RELAY, 0x321 + number, f"/in{number}")
+        system.subscription(NODE, 0x11 + number, f"/in{number}", callback=0xC1 + number)
+        due = random.randrange(period)
+        while due < 600_000_000:
+            start = due + random.randrange(jitter)
+            sent = start + 50_000 + random.randrange(work)
+            published.append((start, number, sent, is_relayed, delay, random.randrange(work)))
+            due += period
+    system.publisher(NODE, OUTPUT, "/out")
+    system.annotate(NODE, "approximate_sync", [0x11 + n for n in range(inputs)], [OUTPUT])
+    origin = system.now + 1_000_000
+    arrived = []
+    for start, number, sent, is_relayed, delay, work in sorted(published):
+        source, relay = Thread(100, 1000 + number), Thread(150, 1500 + number)
+        header = start + random.randrange(sent - start)
+        system.now = origin + start
+        system.start(source, 0x500 + number)
+        system.now = stamp = origin + sent
+        system.publish(source, 0x21 + number, stamp)
+        system.end(source, 0x500 + number)
+        if is_relayed:
+            system.now = stamp + delay
+            system.take(relay, 0x311 + number, stamp)
+            system.start(relay, 0x3C1 + number)
+            system.now = stamp = stamp + delay + work
+            system.publish(relay, 0x321 + number, stamp)
+            system.end(relay, 0x3C1 + number)
+        arrived.append((stamp + delay, number, stamp, header))
+    filters: ApproximateTime[int] = ApproximateTime(inputs, queue_size=10)
+    sets: dict[int, list[int]] = {}
+    free = 0
+    for arrival, number, stamp, header in sorted(arrived):
+        free = max(free, arrival)
+        system.now = free
+        system.take(NODE, 0x11 + number, stamp)
+        begin = system.start(NODE, 0xC1 + number)
+        for used in filters.add(number, header, begin):
+            sets[system.publish(NODE, OUTPUT, 10**12 + len(sets))] = sorted(used)
+        system.end(NODE, 0xC1 + number)
+        free = system.now
+    return system, sets
+
+
+@pytest.mark.parametrize("inputs", few([2, 3, 4], 3))
+@pytest.mark.parametrize("seed", few(range(12), 0))
+def test_headers_are_older_than_publications(analysis: Analysis, inputs: int, seed: int) -> None:
+    system, sets = stamped_early(Random(100 * inputs + seed), inputs)
+    links = found(analysis, system)
+    wrong = {each for each, (used, count) in links.items() if count == 1 and used != sets[each]}
+    assert wrong == set()
+
+
+@pytest.mark.parametrize("inputs", few([2, 3], 3))
+@pytest.mark.parametrize("limits", [{"queue_size": 5}, {"longest_ns": 20_000_000}])
+def test_a_filter_with_limits(analysis: Analysis, inputs: int, limits: dict[str, int]) -> None:
+    arrived = messages(Random(100 * inputs), inputs)
+    system, sets = record(arrived, filters=ApproximateTime(inputs, **limits))
+    links = found(analysis, system)
     wrong = {each for each, (used, count) in links.items() if count == 1 and used != sets[each]}
     assert wrong == set()

@@ -128,6 +128,10 @@ said AS (
                 CASE WHEN is_supposed THEN 'may keep' ELSE 'keeps' END,
                 coalesce(printf(' of %s', topic_name), ''), main.duration_text(period_ns)
             )
+            WHEN 'other_input' THEN printf(
+                'keeps data for %s for %s (p95), until further messages on its inputs come', topic,
+                main.duration_text(p95_ns)
+            )
             WHEN 'restart' THEN printf('ended, and ran again after %s', run)
             || coalesce(
                 printf(': %d of %d messages on %s were lost', lost, published, topic_name), ''

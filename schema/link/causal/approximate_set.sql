@@ -18,6 +18,7 @@ WITH follower AS MATERIALIZED (
         lead(stamp_ns) OVER by_stamp AS next_ns,
         lead(start_event_id) OVER by_stamp AS next_event_id,
         lead(age_ns) OVER by_stamp AS next_age_ns,
+        lag(stamp_ns) OVER by_stamp AS previous_ns,
         stamp_ns < lag(stamp_ns) OVER by_arrival AS is_set_back
     FROM query_table(messages)
     WINDOW
@@ -84,10 +85,10 @@ narrowest AS MATERIALIZED (
 ),
 member AS MATERIALIZED (
     SELECT
-        n.annotation_id, n.pivot_id, n.subscription_id, m.callback_instance_id, m.stamp_ns,
-        m.start_event_id
+        n.annotation_id, n.pivot_id, n.start_ns, n.cost, n.subscription_id, m.callback_instance_id,
+        m.stamp_ns, m.start_event_id, m.age_ns, m.previous_ns, m.next_ns
     FROM (
-        SELECT n.annotation_id, n.pivot_id, n.start_ns, i.subscription_id
+        SELECT n.annotation_id, n.pivot_id, n.start_ns, n.cost, i.subscription_id
         FROM narrowest AS n
         JOIN store.annotation_input AS i ON n.annotation_id = i.annotation_id
     ) AS n
@@ -142,6 +143,16 @@ proven AS (
     GROUP BY a.annotation_id, a.pivot_id, a.pivot_ns, k.event_id
 ),
 -- Each end (a message after the pivot, or the pivot) and each start may be older.
+doubt AS MATERIALIZED (
+    SELECT
+        annotation_id, pivot_id, pivot_ns,
+        CASE
+            WHEN count(*) + count(next_ns) = count(age_ns) + count(next_age_ns)
+                THEN 11 * greatest(max(next_age_ns), max(pivot_age_ns)) + 10 * max(age_ns)
+        END AS cost
+    FROM around
+    GROUP BY annotation_id, pivot_id, pivot_ns
+),
 close AS (
     SELECT p.annotation_id, p.pivot_id
     FROM possible AS p
@@ -149,18 +160,23 @@ close AS (
         ON p.annotation_id = n.annotation_id
         AND p.pivot_id = n.pivot_id
         AND p.start_ns <> n.start_ns
-    JOIN (
-        SELECT
-            annotation_id, pivot_id,
-            CASE
-                WHEN count(*) + count(next_ns) = count(age_ns) + count(next_age_ns)
-                    THEN 11 * greatest(max(next_age_ns), max(pivot_age_ns)) + 10 * max(age_ns)
-            END AS doubt
-        FROM around
-        GROUP BY annotation_id, pivot_id
-    ) AS a
-        ON p.annotation_id = a.annotation_id AND p.pivot_id = a.pivot_id
-    WHERE coalesce(p.cost - n.cost <= a.doubt, true)
+    JOIN doubt AS d ON p.annotation_id = d.annotation_id AND p.pivot_id = d.pivot_id
+    WHERE coalesce(p.cost - n.cost <= d.cost, true)
+    UNION
+    -- A message near the start may be on the other side of it: the next one, or the one before, is
+    -- in the set.
+    SELECT m.annotation_id, m.pivot_id
+    FROM member AS m
+    JOIN member AS s
+        ON m.annotation_id = s.annotation_id AND m.pivot_id = s.pivot_id
+        AND m.start_ns = s.stamp_ns AND m.subscription_id <> s.subscription_id
+    JOIN doubt AS d ON m.annotation_id = d.annotation_id AND m.pivot_id = d.pivot_id
+    WHERE coalesce(m.stamp_ns - m.age_ns <= m.start_ns, true)
+        AND coalesce(
+            11 * (m.next_ns - d.pivot_ns) + 10 * (d.pivot_ns - m.start_ns) - m.cost <= d.cost,
+            m.next_ns IS NOT NULL
+        )
+        OR coalesce(m.previous_ns >= m.start_ns - s.age_ns, m.previous_ns IS NOT NULL)
     UNION
     -- The clock of the stamps was set back: the filter has its messages in another order.
     SELECT annotation_id, pivot_id FROM around WHERE is_set_back OR next_event_id < last_event_id

@@ -1,10 +1,10 @@
 -- description: Messages of the sets that approximately synchronous annotations publish. A
 --     publication inside a callback instance of an input is a firing: that instance showed that a
---     set is complete (derive.approximate_set). If it did so for sets of several pivots that
---     differ, the firing before decides: the pivot is the latest of the first messages of the
---     inputs that came after its set. A link has one candidate if the firing, the firing before and
---     the stamps leave one set. It has two if nothing became complete at the firing but earlier, if
---     the firing before leaves several, if a publisher published more than once, which may be a
+--     set is complete (derive.approximate_set). Its pivot is the latest of the first messages of
+--     the inputs that came after the set of the firing before; if several sets became complete,
+--     that decides. A link has one candidate if the firing, the firing before and the stamps leave
+--     one set. It has two if nothing became complete at the firing but earlier, if the firing
+--     before leaves several or another one, if a publisher published more than once, which may be a
 --     second set, or if headers that are older than the publication would make another set.
 --     `since_ns`: from when on a message that is missing might have changed the choice.
 -- grain: one row per annotation, publication of a firing, and input
@@ -60,7 +60,7 @@ complete AS MATERIALIZED (
         ON f.annotation_id = m.annotation_id AND f.cut_event_id >= m.proof_event_id
     WHERE m.proof_event_id > coalesce(f.previous_event_id, 0)
 ),
--- The firing before used up at least and at most these.
+-- The firing before used up at least and at most these; before the first one nothing is used.
 used AS (
     SELECT
         c.annotation_id, c.cut_event_id, m.subscription_id,
@@ -69,8 +69,14 @@ used AS (
     FROM complete AS c
     JOIN complete AS b ON c.annotation_id = b.annotation_id AND c.previous_event_id = b.cut_event_id
     JOIN member AS m ON b.annotation_id = m.annotation_id AND b.proof_event_id = m.proof_event_id
-    WHERE c.set_count > 1
     GROUP BY c.annotation_id, c.cut_event_id, m.subscription_id
+    UNION ALL
+    SELECT
+        c.annotation_id, c.cut_event_id, i.subscription_id, 0,
+        unnest([1, 2])
+    FROM complete AS c
+    JOIN store.annotation_input AS i ON c.annotation_id = i.annotation_id
+    WHERE c.previous_event_id IS NULL
 ),
 expected AS (
     SELECT
@@ -87,7 +93,8 @@ decided AS (
     SELECT
         c.annotation_id, c.cut_event_id,
         max_by(m.pivot_id, e.reading) AS pivot_id,
-        count(*) = 2 AND count(DISTINCT m.message_ids) = 1 AS is_certain
+        any_value(c.set_count) = 1 OR count(*) = 2 AND count(DISTINCT m.message_ids) = 1
+            AS is_certain
     FROM complete AS c
     JOIN expected AS e ON c.annotation_id = e.annotation_id AND c.cut_event_id = e.cut_event_id
     JOIN made AS m
@@ -103,7 +110,8 @@ chosen AS MATERIALIZED (
         c.since_ns,
         c.set_count > 1 AS may_be_two,
         c.proof_event_id = c.cut_event_id
-        AND (c.set_count = 1 OR coalesce(d.is_certain, false)) AS is_certain
+        AND (c.set_count = 1 OR c.previous_event_id IS NOT NULL)
+        AND coalesce(d.is_certain, false) AS is_certain
     FROM complete AS c
     LEFT JOIN decided AS d ON c.annotation_id = d.annotation_id AND c.cut_event_id = d.cut_event_id
 )

@@ -1,8 +1,8 @@
 -- description: Since when a callback instance can have been due (its release), and by when it was
 --     due for certain. A message can have been due since the end of its publication, or since its
 --     stamp where the two clocks cannot be compared; a request since it was sent. What a ring
---     buffer keeps was due for certain when it was published. A timer is due
---     as derive.timer_due says, in any case after its previous call. All times are those of the
+--     buffer keeps was due for certain when it was published. A timer is due as derive.timer_due
+--     says, after its previous call unless an events executor queued it. All times are those of the
 --     executor's clock; times of other clocks are brought to it. `returned_ns`: its own thread had
 --     published the message by then.
 -- grain: one row per callback instance that is not nested in another
@@ -26,7 +26,10 @@ started AS (
     SELECT
         i.run_id, x.executor_id, i.thread_id, i.callback_id, i.callback_instance_id, i.start_ns,
         i.previous_start_ns, i.take_id, i.request_id, d.due_ns, d.latest_ns,
-        CASE WHEN c.kind = 'timer' THEN i.previous_start_ns END AS called_ns
+        CASE
+            WHEN c.kind = 'timer' AND (d.due_ns < i.previous_start_ns) IS NOT TRUE
+                THEN i.previous_start_ns
+        END AS called_ns
     FROM every_run AS i
     JOIN store.executor_thread AS x ON i.thread_id = x.thread_id
     JOIN store.callback AS c ON i.callback_id = c.callback_id
