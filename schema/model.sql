@@ -177,8 +177,9 @@ CREATE TABLE staging.response (response_id BIGINT, client_id BIGINT, service_id 
 CREATE TABLE staging.ring_buffer_event (trace_id INTEGER, process_id BIGINT, kind VARCHAR,
     buffer_handle UBIGINT, slot BIGINT, at_ns BIGINT, publication_id BIGINT, take_id BIGINT,
     is_overwriting BOOLEAN, event_id BIGINT);
-CREATE TABLE staging.sample_text (pid INTEGER, tid INTEGER, cpu INTEGER, clock_key VARCHAR,
-    hostname VARCHAR, is_monotonic BOOLEAN, at_ns BIGINT, cpu_ns BIGINT, stack VARCHAR);
+CREATE TABLE staging.sample_text (is_of_time BOOLEAN, pid INTEGER, tid INTEGER, cpu INTEGER,
+    clock_key VARCHAR, hostname VARCHAR, is_monotonic BOOLEAN, at_ns BIGINT, cpu_ns BIGINT,
+    stack VARCHAR);
 CREATE TABLE staging.schedule (candidate_number BIGINT, trace_index INTEGER, clock_key VARCHAR,
     shift_ns BIGINT, event_count BIGINT, agreeing_count BIGINT, unknown_count BIGINT,
     is_joined BOOLEAN, has_cpus BOOLEAN, is_placed BOOLEAN, placed_clock_key VARCHAR,

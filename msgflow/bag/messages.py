@@ -9,9 +9,10 @@ from __future__ import annotations
 import contextlib
 import errno
 import importlib.util
+import re
 import resource
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,9 @@ from msgflow.trace.regular_file import irregular
 
 if TYPE_CHECKING:
     import duckdb
+    from rosbags.interfaces import Connection
+    from rosbags.rosbag2 import Reader
+    from rosbags.typesys.store import Typestore
 
     from msgflow.run.choice import Run
 
@@ -43,6 +47,10 @@ _SCHEMA = pa.schema(
     }
 )
 _ROWS_AT_ONCE = 50_000
+# It repeats the whole definition.
+_LONGEST_REASON = 1 << 7
+# Stands before each type in a definition of the interface language.
+_IDL = re.compile(r"^=+\nIDL: .*\n", re.MULTILINE)
 _CLOCKS_APART = """
 SELECT count(*) > 1
     AND (count(reference_clock_id) < count(*) OR count(DISTINCT reference_clock_id) > 1)
@@ -68,7 +76,8 @@ def read_bag(bag: Path, *, memory_limit: str | None = None) -> Iterator[pa.Recor
 
     Yields:
         Rows with `message` (number), `topic_name`, `type_name`, `received_ns`, `size_bytes` (of
-        the serialised message), and where the type has a header `stamp_ns` and `frame_id`.
+        the serialised message), and where the type has a header `stamp_ns` and `frame_id`. The
+        metadata of their schema have the topics that are left out, each with the reason.
     """
     if importlib.util.find_spec("rosbags") is None:
         raise UsageError(
@@ -99,8 +108,7 @@ def write_messages(
 ) -> None:
     """Write the messages of a bag to a file, in the child; what it unpacks lies beside it."""
     import duckdb
-    from rosbags.highlevel import AnyReader
-    from rosbags.typesys import Stores, get_typestore
+    from rosbags.rosbag2 import Reader
 
     path = Path(bag)
     tempfile.tempdir = str(Path(target).parent)
@@ -109,14 +117,12 @@ def write_messages(
         set_memory_limit(con, memory_limit)
         bound_process(con)
     try:
-        # Bags from before Iron do not hold their types. The reader knows those of ROS itself.
-        with (
-            AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader,
-            pa.OSFile(target, "w") as stream,
-            pa.ipc.new_stream(stream, _SCHEMA) as rows,
-        ):
-            for table in _tables(reader, most_bytes):
-                rows.write_table(table)
+        with Reader(path) as reader, pa.OSFile(target, "w") as stream:
+            stores, left_out = _types(reader.connections)
+            schema = _SCHEMA.with_metadata(left_out)
+            with pa.ipc.new_stream(stream, schema) as rows:
+                for table in _tables(reader, stores, left_out, most_bytes):
+                    rows.write_table(table.replace_schema_metadata(left_out))
     except MemoryError:
         raise TraceError(
             f"the bag takes more memory unpacked than {memory_limit} — {bag}",
@@ -132,32 +138,78 @@ def write_messages(
 
 
 def _unread(bag: Path, error: Exception) -> TraceError:
-    said = str(error).strip().splitlines()
     return TraceError(
-        f"cannot read as a bag of ROS 2: {said[0] if said else type(error).__name__} — {bag}",
-        "give the directory of a rosbag2; ros2 bag reindex repairs one that was cut off",
+        f"cannot read as a bag of ROS 2: {_line(error) or type(error).__name__} — {bag}",
+        "give the directory of a rosbag2, or one of its files; ros2 bag reindex repairs one that"
+        " was cut off",
     )
 
 
-def _tables(reader: Any, most_bytes: int) -> Iterator[pa.Table]:
-    from rosbags.interfaces import Nodetype
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())
 
-    types = reader.typestore.fielddefs
-    header = ("header", (Nodetype.NAME, _HEADER))
-    with_header = {name for name, (_, fields) in types.items() if header in fields}
+
+def _types(connections: Sequence[Connection]) -> tuple[dict[str, Typestore], dict[str, str]]:
+    """Return by name what reads types with a header, and why topics of other types are left out.
+
+    Of services `ros2 bag record` writes definitions that are none of a message.
+    """
+    from rosbags.interfaces import MessageDefinitionFormat, Nodetype
+    from rosbags.typesys import (
+        Stores,
+        TypesysError,
+        get_types_from_idl,
+        get_types_from_msg,
+        get_typestore,
+    )
+
+    stores: dict[str, Typestore] = {}
+    left_out = {}
+    # Bags from before Iron do not hold their types.
+    of_ros = get_typestore(Stores.LATEST)
+    for connection in connections:
+        name, (kind, text) = connection.msgtype, connection.msgdef
+        store = of_ros
+        try:
+            if kind != MessageDefinitionFormat.NONE:
+                store = get_typestore(Stores.EMPTY)
+                if kind == MessageDefinitionFormat.MSG:
+                    store.register(get_types_from_msg(text, name))
+                else:
+                    for part in _IDL.split(text):
+                        store.register(get_types_from_idl(part) if part.strip() else {})
+        except TypesysError as error:
+            reason = _line(error)[:_LONGEST_REASON]
+            left_out[connection.topic] = f"the definition of {name} cannot be read: {reason}"
+            continue
+        _, fields = store.fielddefs.get(name, ((), ()))
+        if ("header", (Nodetype.NAME, _HEADER)) in fields:
+            stores[name] = store
+    return stores, left_out
+
+
+def _tables(
+    reader: Reader,
+    stores: Mapping[str, Typestore],
+    left_out: Container[str],
+    most_bytes: int,
+) -> Iterator[pa.Table]:
     rows: list[dict[str, Any]] = []
     number = 0
-    packed = any(getattr(each, "compression_mode", None) == "message" for each in reader.readers)
+    packed = reader.compression_mode == "message"
     left = most_bytes
     for number, (connection, received_ns, data) in enumerate(reader.messages(), 1):
         left -= len(data) if packed else 0
         if left < 0:
             raise OSError(errno.EFBIG, "messages are too large")
+        if connection.topic in left_out:
+            continue
         stamp_ns = frame_id = None
-        if connection.msgtype in with_header:
-            header = reader.deserialize(data, connection.msgtype).header
-            stamp_ns = header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
-            frame_id = header.frame_id
+        if (store := stores.get(connection.msgtype)) is not None:
+            message: Any = store.deserialize_cdr(data, connection.msgtype)
+            stamp = message.header.stamp
+            stamp_ns = stamp.sec * 1_000_000_000 + stamp.nanosec
+            frame_id = message.header.frame_id
         rows.append(
             {
                 "message": number,
@@ -193,6 +245,10 @@ def join_bag(
             f"msgflow clocks apply messages --run {one.name}",
         )
     given: dict[str, Any] = {"run_id": one.run_id}
+    notes = [
+        f"{topic.decode()} is left out: {reason.decode()}"
+        for topic, reason in (messages.schema.metadata or {}).items()
+    ]
     con.register("bag_messages", messages)
     con.execute("CREATE OR REPLACE TEMP TABLE bag_read AS FROM bag_messages")
     con.unregister("bag_messages")
@@ -202,4 +258,4 @@ def join_bag(
     table = internal_sql().run(con, "bag_topic", {}).to_arrow_table()
     con.execute("DROP TABLE temp.bag_read")
     con.execute("DROP TABLE temp.bag_joined")
-    return QueryResult(table, internal_sql().header("bag_topic"), runs)
+    return QueryResult(table, internal_sql().header("bag_topic"), runs, notes)

@@ -313,8 +313,6 @@ def _record(
                 channel=Channel(rotation_ns=step_ns),
                 program=words,
                 log=log,
-                # Of each process a trace in each chunk, to read again in each window.
-                cpu_time=False,
                 note=print_note,
                 show=show,
             )

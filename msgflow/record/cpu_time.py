@@ -40,7 +40,8 @@ def recorded_cpu_time(
 
     Where a process may not read its clock, LTTng records none of its events in a session that asks
     for it, and now and then none of others that share its buffers. So the session of the events
-    does not ask for it, and in this one processes share none.
+    does not ask for it, and in this one processes share none; but for chunks, which would have a
+    trace of each process.
     """
     # What that leaves out costs nothing here.
     events = [
@@ -51,9 +52,10 @@ def recorded_cpu_time(
     clocks = Channel(
         events=(",".join(events),),
         # A second of thousands of callbacks of a process, on each CPU.
-        sub_buffer_size="64K",
+        sub_buffer_size="64K" if channel.rotation_ns is None else channel.sub_buffer_size,
         contexts=(*CONTEXTS, "perf:thread:task-clock"),
-        is_per_process=True,
+        is_per_process=channel.rotation_ns is None,
+        rotation_ns=channel.rotation_ns,
     )
     place = directory / DIRECTORY
     with ExitStack() as stack:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -33,6 +34,8 @@ _FOREIGN = {
 }
 _STREAM_MAGICS = {b"\xc1\x1f\xfc\xc1", b"\xc1\xfc\x1f\xc1"}
 _MAGIC_SIZE = 4
+# LTTng writes it into the metadata of traces of programs, in CTF 1.8 and CTF 2.
+_OF_PROGRAMS = re.compile(rb'\bdomain"?\s*[=:]\s*"ust"')
 _MOST_LOOKED_AT = 20
 
 
@@ -60,12 +63,7 @@ def discover(paths: Sequence[str | Path]) -> list[TraceLocation]:
     if not locations:
         raise TraceError("no trace given", hint="msgflow ingest TRACE")
     if not any(location.size_bytes for location in locations):
-        raise TraceError(
-            "the trace has metadata but no events, nothing was recorded — "
-            + ", ".join(str(location.path) for location in locations),
-            hint="start the trace before the application, check that tracetools was built with "
-            "LTTng: ros2 run tracetools status",
-        )
+        raise _no_event_error([location.path for location in locations])
     return locations
 
 
@@ -173,6 +171,20 @@ def _locate(directory: Path) -> TraceLocation:
                 hint=f"sudo chown -R $USER {shlex.quote(str(directory))}",
             )
     return TraceLocation(directory, size)
+
+
+def _no_event_error(paths: Sequence[Path]) -> TraceError:
+    listed = ", ".join(map(str, paths))
+    if not any(_OF_PROGRAMS.search(metadata_frame.text_of(path)[1]) for path in paths):
+        return TraceError(
+            f"the trace has metadata but no events, other files are missing or empty — {listed}",
+            hint="copy all files of the directory again from where it was recorded",
+        )
+    return TraceError(
+        f"the trace has metadata but no events, nothing was recorded — {listed}",
+        hint="start the trace before the application, check that tracetools was built with "
+        "LTTng: ros2 run tracetools status",
+    )
 
 
 def _no_trace_error(path: Path, strays: Sequence[Path]) -> TraceError:

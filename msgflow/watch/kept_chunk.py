@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from msgflow import trace as trace_package
 from msgflow.ingest.catalogue import load
 from msgflow.ingest.load import wanted_events
+from msgflow.ingest.readings import with_counters
 from msgflow.trace import PACKET, Continuation, Damage, EventBatch, TraceInfo, TraceSet
 from msgflow.trace.archive import Unpacked
 from msgflow.trace.numpy_arrow import to_arrow, to_numpy
@@ -134,14 +135,16 @@ class KeptTraces(TraceSet):
         order = np.argsort(np.concatenate([part.times_ns for part in self._parts]), kind="stable")
         ids = np.empty_like(order)
         ids[order] = np.arange(order.size)
-        events: dict[str, list[pa.RecordBatch]] = {}
+        # Sessions differ in the counters that they read.
+        events: dict[tuple[str, tuple[str, ...]], list[pa.RecordBatch]] = {}
         for part, places, first in zip(self._parts, self._places, firsts[:-1], strict=True):
             for packets in part.packets:
                 yield EventBatch(PACKET, _placed(packets, places), 0)
             for name, batch in part.events.items():
                 numbered = _with_column(batch, "event_id", ids[first + to_numpy(batch["event_id"])])
-                events.setdefault(name, []).append(_placed(numbered, places))
-        for name, batches in events.items():
+                key = name, tuple(batch.schema.names)
+                events.setdefault(key, []).append(_placed(numbered, places))
+        for (name, _), batches in events.items():
             batch = _joined(batches)
             by_id = np.argsort(to_numpy(batch["event_id"]), kind="stable")
             is_ordered = bool((by_id == np.arange(by_id.size)).all())
@@ -160,7 +163,7 @@ def read_chunk(chunk: Chunk, after: Continuation, *, without_own: bool = False) 
     events: dict[str, list[pa.RecordBatch]] = {}
     packets = []
     with trace_package.open([chunk.path], after=after) as traces:
-        for batch in traces.batches(wanted_events()):
+        for batch in traces.batches(with_counters(wanted_events(), traces.traces)):
             if batch.name == PACKET:
                 packets.append(batch.batch)
             else:

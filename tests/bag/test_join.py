@@ -246,6 +246,66 @@ def test_a_damaged_bag_is_an_error_and_changes_nothing(
     assert stored(database) == before
 
 
+# Name of a topic, its type, the language of its definition, and that.
+Channel = tuple[str, str, str, bytes]
+
+
+def write_mcap(bag: Path, channels: Iterable[Channel], message: bytes, received_ns: int) -> Path:
+    """Write a message of each topic, as `ros2 bag record` does."""
+    writer = pytest.importorskip("mcap.writer").Writer(str(bag))
+    writer.start(profile="ros2", library="test")
+    for topic, kind, language, text in channels:
+        schema = writer.register_schema(kind, language, text)
+        channel = writer.register_channel(topic, "cdr", schema, {"offered_qos_profiles": ""})
+        writer.add_message(channel, received_ns, message, received_ns)
+    writer.finish()
+    return bag
+
+
+def test_a_topic_whose_definition_cannot_be_read_is_left_out(
+    database: Path, tmp_path: Path
+) -> None:
+    """Of a service `ros2 bag record` writes the text of the service into MCAP."""
+    publication, topic, sent_ns = published(database)[0]
+    service = ("/reset/_service_event", "my_pkg/srv/Reset_Event")
+    channels = [
+        (*service, "ros2msg", b"bool hard\n---\nbool done\n"),
+        (topic, PLAIN, "ros2msg", b"string data\n"),
+    ]
+    message = b"\0\1\0\0\2\0\0\0a\0"
+    bag = write_mcap(tmp_path / "bag.mcap", channels, message, sent_ns + 9_000)
+    with open_db(database) as opened:
+        result = opened.join_bag(bag)
+    (row,) = stored(database)
+    assert (row["publication_id"], row["topic_name"], row["size_bytes"]) == (publication, topic, 10)
+    (note,) = result.notes
+    assert note.startswith(
+        "/reset/_service_event is left out: the definition of my_pkg/srv/Reset_Event cannot be"
+        " read: Could not parse: 'MSG: my_pkg"
+    )
+
+
+OF_IDL = [
+    "struct Time { long sec; unsigned long nanosec; };",
+    "struct Header { builtin_interfaces::msg::Time stamp; string frame_id; };",
+    "struct Mine { std_msgs::msg::Header header; };",
+]
+
+
+def test_a_definition_in_idl_has_several_parts(tmp_path: Path) -> None:
+    packages = ("builtin_interfaces", "std_msgs", "my_pkg")
+    parts = [
+        f"{'=' * 80}\nIDL: {package}/msg/X\nmodule {package} {{ module msg {{ {text} }}; }};\n"
+        for package, text in zip(packages, OF_IDL, strict=True)
+    ]
+    channel = ("/mine", "my_pkg/msg/Mine", "ros2idl", "".join(reversed(parts)).encode())
+    message = struct.pack("<4siII2s", b"\0\1\0\0", 3, 4, 2, b"a\0")
+    with read_bag(write_mcap(tmp_path / "bag.mcap", [channel], message, SECOND)) as found:
+        assert not found.schema.metadata
+        (row,) = found.read_all().to_pylist()
+    assert (row["stamp_ns"], row["frame_id"]) == (3 * SECOND + 4, "a")
+
+
 @pytest.mark.parametrize("name", few(["metadata.yaml", "bag.mcap"], "bag.mcap"))
 def test_a_pipe_is_refused(tmp_path: Path, name: str) -> None:
     os.mkfifo(tmp_path / name)

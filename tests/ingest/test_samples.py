@@ -122,6 +122,27 @@ def test_shares_of_functions_of_a_simulated_system(
     assert len(rows) == sum(row["samples"] for row in found if row["function"] == "main")
 
 
+# Without -F: of the thread alone, or of neither time nor CPU; of one address; of another event.
+PLAIN = (
+    f"node  4711 [000] 1000.000001:    1001001 cpu-clock: \n{STACK}\n"
+    f"my node 4711 cycles:u: \n{STACK}\n"
+    "node  4711 1000.000001: cpu-clock:  55d0c0de1000 compute (/opt/node)\n"
+    "node  4711 [001] 1000.000001:          1 page-faults:  55d0c0de1000 compute (/opt/node)\n"
+)
+
+
+def test_the_text_of_plain_perf_script_is_not_joined(session: Path, new_database: Path) -> None:
+    """A line of a name is none of these samples."""
+    name = f"a\nname 1/1 [000] 1.000001: 7 cache-misses: \n{STACK}\n"
+    (session / TEXT).write_text(HEADER.format("anywhere") + PLAIN + name)
+    findings = ingest([session], new_database).findings
+    by_count = {one.count: one.detail for one in findings if one.name == "samples_not_joined"}
+    assert by_count.keys() == {1, 4}
+    assert "none of 1 samples of functions is of a clock" in by_count[1]
+    assert "4 samples of functions lack the id of their process" in by_count[4]
+    assert "perf script --header --ns -F pid,tid,cpu,time," in by_count[4]
+
+
 def test_samples_in_an_archive_are_read(session: Path, text: str, new_database: Path) -> None:
     (session / TEXT).write_text(text)
     archive = shutil.make_archive(str(session), "tar", session)

@@ -164,6 +164,18 @@ def test_processes_share_no_buffers(said: list[tuple[str, ...]], tmp_path: Path)
     assert words["add-context"][-1] == "--type=perf:thread:task-clock"
 
 
+def test_a_chunk_has_one_trace_of_all_processes(
+    said: list[tuple[str, ...]], tmp_path: Path
+) -> None:
+    channel = Channel(sub_buffer_size="8M", rotation_ns=2_000_000_000)
+    with recorded_cpu_time("drive", tmp_path, channel, pytest.fail):
+        pass
+    words = {some[0]: some for some in said}
+    assert "--buffers-pid" not in words["enable-channel"]
+    assert "--subbuf-size=8M" in words["enable-channel"]
+    assert words["enable-rotation"][1:] == ("--session=drive-cpu", "--timer=2000000us")
+
+
 def test_an_lttng_that_refuses_is_named(
     said: list[tuple[str, ...]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

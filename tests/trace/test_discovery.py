@@ -143,6 +143,14 @@ def test_metadata_without_any_event(tmp_path: Path) -> None:
     fails([tmp_path], f"has metadata but no events, nothing was recorded — {trace}", "tracetools")
 
 
+@pytest.mark.parametrize("domain", ['domain = "kernel";', 'hostname = "domain";'])
+def test_metadata_without_any_event_that_is_of_no_program(tmp_path: Path, domain: str) -> None:
+    trace = write_trace(tmp_path / "trace", TraceContent(events={"x": {}}, streams={0: []}))
+    text = (trace / "metadata").read_text()
+    (trace / "metadata").write_text(text.replace('domain = "ust";', domain))
+    fails([trace], f"no events, other files are missing or empty — {trace}", "copy all files")
+
+
 def test_stream_that_must_not_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     trace = write_trace(tmp_path / "trace", CONTENT)
     monkeypatch.setattr(os, "access", lambda path, mode: False)

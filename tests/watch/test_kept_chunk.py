@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+from dataclasses import replace
 from functools import reduce
 from pathlib import Path
 
@@ -9,7 +11,10 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from msgflow.clocks.clocks_file import ClockSync
+from msgflow.ingest.repeated_in_memory import database_in_memory, ingest_again
 from msgflow.trace import Continuation
+from msgflow.trace.columns import CONTEXT
 from msgflow.watch.chunk import finished_chunks
 from msgflow.watch.kept_chunk import KeptChunk, KeptTraces, read_chunk
 from msgflow_sim import Recording, simulate
@@ -52,6 +57,43 @@ def test_what_lasts_of_several_chunks_is_one_part(tmp_path: Path) -> None:
         for lasting in (parts, [one])
     )
     assert single == whole
+
+
+def test_a_window_has_what_a_second_session_read_of_the_clocks_of_threads(tmp_path: Path) -> None:
+    """Beside its events, which count once."""
+    simulate("pipeline", tmp_path / "trace", factor=0.1, recording=Recording(rotations=(10**9,)))
+    chunk, *_ = finished_chunks(tmp_path / "trace")
+    kept = read_chunk(chunk, Continuation())
+    assert kept is not None
+    clock = pa.field("perf_thread_task_clock", pa.int64(), metadata={CONTEXT: b""})
+    # As if each thread did nothing but compute.
+    read = {
+        name: kept.events[name].append_column(clock, kept.events[name]["ts_ns"])
+        for name in ("ros2:callback_start", "ros2:callback_end")
+    }
+    reader = {"counters": (clock.name,), "event_names": tuple(read)}
+    clocks = replace(
+        kept,
+        events=read,
+        packets=(),
+        traces=tuple(replace(trace, **reader) for trace in kept.traces),
+    )
+    with closing(database_in_memory()) as con:
+        ingest_again(
+            con,
+            KeptTraces([], [kept, clocks]),
+            "watch",
+            links=None,
+            clocks=ClockSync("none"),
+            leave_out=lambda link, error: pytest.fail(str(error)),
+        )
+        ran = con.execute(
+            "SELECT count(*), count(*) FILTER (cpu_ns = end_ns - start_ns) FROM callback_instance"
+            " WHERE end_ns IS NOT NULL"
+        ).fetchall()
+    count = kept.events["ros2:callback_end"].num_rows
+    assert count > 0
+    assert ran == [(count, count)]
 
 
 def test_what_a_callback_of_python_took_does_not_last() -> None:

@@ -87,9 +87,10 @@ class _Blocks(TypeParser):
                 continue
             name = str(self.value())
             if self.take_if(":="):
-                if name not in _SCOPES:
-                    raise MetadataError(f"there is no structure {name!r}")
-                block.structures[_SCOPES[name]] = self.structure()
+                structure = self.structure()
+                # As with values, what no reader knows says nothing.
+                if name in _SCOPES:
+                    block.structures[_SCOPES[name]] = structure
             else:
                 self.expect("=")
                 block.values[name] = self.value()

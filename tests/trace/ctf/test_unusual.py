@@ -244,3 +244,28 @@ def test_long_packet_beside_short_ones(tmp_path: Path, batch_rows: int) -> None:
     assert [row[0] for row in rows] == list(range(1000 + 40_000))
     assert [row[1] for row in rows] == sorted(row[1] for row in rows)
     assert not content.damages
+
+
+def test_words_that_no_reader_knows(tmp_path: Path, bt2_bindings: Any) -> None:
+    """As in `warnings` of Babeltrace's own tests."""
+    metadata = f"""
+        {CLOCK} {TYPES}
+        typealias integer {{ size = 32; align = 32; zz = aa; }} := odd_t;
+        typealias integer {{ size = 8; align = 8; {TIME} }} := time8_t;
+        trace {{ major = 1; minor = 8; byte_order = le; bb = "aa"; of_trace := struct {{ }}; }};
+        stream {{
+            packet.context := struct {{ odd_t content_size; odd_t packet_size; }};
+            event.header := struct {{ time8_t timestamp; }};
+            of_stream := struct {{ uint8_t one; }};
+            other = 1;
+        }};
+        event {{
+            name = string;
+            fields := struct {{ string text; }};
+            of_event := struct {{ uint8_t one; }};
+        }};
+    """
+    content = b"\1one\0\2two\0"
+    bits = (8 + len(content)) * 8
+    path = write(tmp_path / "trace", metadata, stream=struct.pack("<II", bits, bits) + content)
+    assert_as_bt2(path, bt2_bindings, 2)
