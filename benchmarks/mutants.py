@@ -64,6 +64,7 @@ FINDINGS = (
     "service_without_callbacks",
     "started_late",
     "stream_ends_early",
+    "untaken_request",
 )
 # Kinds of culprits that limits decide of.
 CULPRITS = (
@@ -165,7 +166,11 @@ RULES = (
     ("public/goal.sql", ("schema/cases/main.goal",)),
     ("public/action_client.sql", ("schema/cases/main.action_client",)),
     ("public/action_server.sql", ("schema/cases/main.action_server",)),
-    ("stat/action", ("schema/cases/main.goal", "schema/cases/main.action_server")),
+    *(
+        (each, ("schema/cases/main.goal", "schema/cases/main.action_server"))
+        for each in ("stat/action", "link/action")
+    ),
+    ("link/causal/answer_to_call.sql", ("model/test_take_adjacent_links.py",)),
     (
         "stat/executor/callback_release.sql",
         ("schema/cases/main.executor_wait", "schema/cases/derive.callback_release"),

@@ -198,11 +198,19 @@ class Witness(Node):
 
         return send
 
-    def act(self, action: str, work, messages: int) -> None:
-        """Execute goals: do some work before each message of feedback. Each fifth is rejected."""
+    def act(self, action: str, work, messages: int, other: str | None = None) -> None:
+        """Execute goals: do some work before each message of feedback. Each fifth is rejected.
+
+        Args:
+            action: its name.
+            work: what is done.
+            messages: how many there are for each goal.
+            other: an action whose result is awaited behind each message: execution is a coroutine.
+        """
 
         # What accepted a goal is the reason for all that its execution does.
         accepted = {}
+        ask = None if other is None else self._asker(other, ReentrantCallbackGroup())
 
         def decide(goal: Fibonacci.Goal) -> GoalResponse:
             is_accepted = goal.order % 5 != 0
@@ -219,16 +227,32 @@ class Witness(Node):
                 if goal.is_cancel_requested:
                     goal.canceled()
                     return Fibonacci.Result()
-                feedback = f"{action}/_action/feedback"
-                call = accepted[number]
-                with self._sent("publication", feedback, next(self._ids), goal=number, call=call):
-                    goal.publish_feedback(Fibonacci.Feedback(sequence=[number]))
+                feed(goal, number)
             goal.succeed()
             return Fibonacci.Result(sequence=[number])
 
+        async def execute_awaiting(goal) -> Fibonacci.Result:
+            number = goal.request.order
+            for _ in range(messages):
+                work(call=accepted[number])
+                feed(goal, number)
+                await ask(accepted[number])
+            work(call=accepted[number])
+            goal.succeed()
+            return Fibonacci.Result(sequence=[number])
+
+        def feed(goal, number: int) -> None:
+            message = next(self._ids)
+            place = {"goal": number, "call": accepted[number]}
+            with self._sent("publication", f"{action}/_action/feedback", message, **place):
+                # Numbers of 32 bits.
+                sequence = [number, message >> 32, message % (1 << 32)]
+                goal.publish_feedback(Fibonacci.Feedback(sequence=sequence))
+
         self._actions.append(
             ActionServer(
-                self, Fibonacci, action, execute, callback_group=ReentrantCallbackGroup(),
+                self, Fibonacci, action, execute if ask is None else execute_awaiting,
+                callback_group=ReentrantCallbackGroup(),
                 goal_callback=decide, cancel_callback=lambda goal: CancelResponse.ACCEPT,
             )
         )  # fmt: skip
@@ -263,6 +287,49 @@ class Witness(Node):
                 pass
 
         return send
+
+    def pursue(self, heard: str, action: str, group=None) -> None:
+        """Send a goal for each message of a topic, and publish when it is accepted and is over.
+
+        The callback is a coroutine. Each message of feedback is answered on /fed.
+        """
+        ask = self._asker(action, group, self.sender("/fed"))
+        accepted, ended = self.sender("/accepted"), self.sender("/result")
+
+        async def run(message: UInt64) -> None:
+            begin = time.monotonic_ns()
+            with self._callback(begin, "sub", heard, message.data) as row:
+                call = self._running.number
+            row["t1"] = time.monotonic_ns()
+            await ask(call, lambda: accepted(call=call))
+            ended(call=call)
+
+        self.create_subscription(UInt64, heard, run, 10, callback_group=group)
+
+    def _asker(self, action: str, group, answer=None):
+        """Return a coroutine that sends a goal and awaits its result, for a callback."""
+        client = ActionClient(self, Fibonacci, action, callback_group=group)
+        goals = itertools.count(1)
+
+        def fed(message) -> None:
+            _, high, low = message.feedback.sequence
+            name = f"{action}/_action/feedback"
+            with self._callback(time.monotonic_ns(), "sub", name, (high << 32) + low):
+                if answer is not None:
+                    answer()
+
+        async def ask(call: int, accepted=lambda: None) -> None:
+            number = next(goals)
+            with self._sent("request", f"{action}/_action/send_goal", number, call=call):
+                future = client.send_goal_async(Fibonacci.Goal(order=number), fed)
+            goal = await future
+            accepted()
+            if goal.accepted:
+                with self._sent("request", f"{action}/_action/get_result", number, call=call):
+                    future = goal.get_result_async()
+                await future
+
+        return ask
 
     @contextlib.contextmanager
     def _callback(self, begin: int, kind: str, name: str, message: int, accepted=None):
@@ -398,6 +465,52 @@ def asker(truth: Truth) -> list[Node]:
     node = Witness("asker", truth)
     node.every(0.08, node.sender_of_goals("/dock"))
     node.every(0.11, node.sender_of_goals("/move"))
+    return [node]
+
+
+def commander(truth: Truth) -> list[Node]:
+    """Send a goal for each message of /scan, and await its result; also answer /tick at once."""
+    node = Witness("commander", truth)
+    node.pursue("/scan", "/move", ReentrantCallbackGroup())
+    send = node.sender("/filtered")
+    node.on("/tick", lambda: (busy(0.000_5), send()))
+    return [node]
+
+
+def mover(truth: Truth) -> list[Node]:
+    """Execute goals, each with goals of another action, which are awaited; also answer /tick."""
+    node = Witness("mover", truth)
+    node.act("/move", node.sender("/progress"), 3, "/grip")
+    send = node.sender("/heard")
+    node.on("/tick", lambda: (busy(0.000_5), send()))
+    return [node]
+
+
+def both(truth: Truth) -> list[Node]:
+    """Send goals, and execute them, in one executor."""
+    return [*commander(truth), *mover(truth)]
+
+
+def gripper(truth: Truth) -> list[Node]:
+    """Execute goals."""
+    node = Witness("gripper", truth)
+    node.act("/grip", lambda: time.sleep(0.002), 2)
+    return [node]
+
+
+def goal_sink(truth: Truth) -> list[Node]:
+    """Hear what is published for goals."""
+    node = Witness("goal_sink", truth)
+    for topic in ("/fed", "/accepted", "/result", "/progress", "/filtered", "/heard"):
+        node.on(topic, lambda: busy(0.000_2))
+    return [node]
+
+
+def beating(truth: Truth) -> list[Node]:
+    """Publish /scan and, more often, /tick."""
+    node = Witness("beating", truth)
+    node.every(0.09, node.sender("/scan"))
+    node.every(0.011, node.sender("/tick"))
     return [node]
 
 
@@ -630,6 +743,20 @@ SYSTEMS = {
     "mixed": {"sink": (sink, SingleThreadedExecutor),
               "filter": (relay_with_timer, SingleThreadedExecutor),
               "source": (source, SingleThreadedExecutor)},
+    "goals": {"sink": (goal_sink, SingleThreadedExecutor),
+              "gripper": (gripper, SingleThreadedExecutor),
+              "mover": (mover, SingleThreadedExecutor),
+              "commander": (commander, SingleThreadedExecutor),
+              "beating": (beating, SingleThreadedExecutor)},
+    "goals_together": {"sink": (goal_sink, SingleThreadedExecutor),
+                       "gripper": (gripper, SingleThreadedExecutor),
+                       "both": (both, MultiThreadedExecutor),
+                       "beating": (beating, SingleThreadedExecutor)},
+    "goals_threads": {"sink": (goal_sink, SingleThreadedExecutor),
+                      "gripper": (gripper, MultiThreadedExecutor),
+                      "mover": (mover, MultiThreadedExecutor),
+                      "commander": (commander, MultiThreadedExecutor),
+                      "beating": (beating, SingleThreadedExecutor)},
     "awaiting": {"sink": (sink, SingleThreadedExecutor),
                  "awaiting": (awaiting, SingleThreadedExecutor),
                  "ticking": (ticking, SingleThreadedExecutor)},

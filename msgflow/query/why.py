@@ -153,6 +153,7 @@ class _Questions:
                 [values] if _UNNAMED in path.split(ARROW) else [],
                 (),
             ),
+            (internal_sql().header("hanging_call"), self.internal("hanging_call", values), ()),
             (internal_sql().header("piece_to_ask"), pieces, since),
             (load_query("critical-path"), flow.table.to_pylist()[:1], ()),
             (internal_sql().header("callback_function"), functions, since),
@@ -255,6 +256,9 @@ class _Questions:
                     f"flows begin there or pass, none ends — {self.place}",
                     shlex.join(["msgflow", "query", _FIRST, "--via", self.place]),
                 )
+            values = {"runs": [self.run.run_id], "place": self.place}
+            for row in self.internal("untaken_place", values):
+                message += f"; {row['sentence']}"
         return NoFlowError(message, "msgflow check says where flows break off")
 
 

@@ -410,3 +410,20 @@ def test_a_path_through_a_service_that_is_not_traced(system: RosSystem, analyse:
         "service",
         "callback",
     ]
+
+
+@pytest.mark.parametrize(
+    ("service", "count"), [("/a/_action/cancel_goal", 1), ("/a/_action/get_result", 0)]
+)
+def test_a_question_for_a_result_waits_for_it(
+    system: RosSystem, analyse: Analyse, service: str, count: int
+) -> None:
+    """What rclpy sends before the answer is due to other requests, but not to that one."""
+    python = Thread(300)
+    system.node(python, 0x3, "acting")
+    system.service(python, 0x40, service, callback=None, node=0x3)
+    system.publisher(python, 0x41, "/progress", node=0x3)
+    system.take_request(python, 0x40, 1, gid=7)
+    system.publish(python, 0x41, 1, layers="rcl rmw")
+    system.send_response(python, 0x40, 1, gid=7, stamp=1)
+    assert len(analyse(system).rows(LINKS)) == count

@@ -257,3 +257,78 @@ def test_timers_that_jobs_start_again(python: RosSystem, analyse: Analyse) -> No
     job(python, 1, 5, 2, POOL)
     python.idle(MAIN)
     assert analyse(python).rows(CAUSES) == [(1, 11, "direct", 1), (2, 11, "direct", 2)]
+
+
+@pytest.fixture
+def goals(python: RosSystem) -> RosSystem:
+    """It also sends goals, and function 7 gets the feedback."""
+    python.client(MAIN, 0x30, "/dock/_action/send_goal", gid=7, node=0x1)
+    python.subscription(MAIN, 0x31, "/dock/_action/feedback", node=0x1)
+    python.subscription(MAIN, 0x32, "/dock/_action/status", node=0x1)
+    python.python(MAIN, 7, "function node:fed")
+    return python
+
+
+@pytest.mark.parametrize("is_cut", [False, True])
+@pytest.mark.parametrize(("taken", "cause"), [("F", 31), ("FS", 31), ("S", None)])
+def test_feedback_with_the_states_of_goals(
+    goals: RosSystem, analyse: Analyse, taken: str, cause: int | None, is_cut: bool
+) -> None:
+    """Taken at once: only feedback has a callback. The tracer may say that the turn was over."""
+    goals.ready(MAIN)
+    for one in taken:
+        goals.take(MAIN, 0x31 if one == "F" else 0x32, 31, layers="rmw rcl")
+    if is_cut and taken.endswith("S"):
+        goals.ready(MAIN)
+    goals.start(MAIN, 7)
+    goals.publish(MAIN, 0x10, 1, layers="rcl rmw")
+    goals.end(MAIN, 7)
+    analysis = analyse(goals)
+    assert analysis.rows(CAUSES) == [(1, cause, "direct", 1)]
+    if cause:
+        assert analysis.rows(
+            "SELECT topic_name FROM take JOIN callback_instance USING (take_id) "
+            "JOIN subscription USING (subscription_id)"
+        ) == [("/dock/_action/feedback",)]
+
+
+def test_a_task_is_not_for_feedback(goals: RosSystem, analyse: Analyse) -> None:
+    hear(goals, 0x20, 0xCA, 11)
+    goals.python(MAIN, 1, "step")
+    goals.end(MAIN, 0xCA)
+    goals.ready(MAIN)
+    goals.take(MAIN, 0x31, 31, layers="rmw rcl")
+    goals.take(MAIN, 0x32, 32, layers="rmw rcl")
+    resume(goals, 1, 7)
+    goals.publish(MAIN, 0x10, 1, layers="rcl rmw")
+    goals.end(MAIN, 7)
+    assert analyse(goals).rows(CAUSES) == [(1, 11, "direct", 1)]
+
+
+def test_an_open_coroutine_takes_nothing(goals: RosSystem, analyse: Analyse) -> None:
+    """While it awaits, its thread takes for others; one of its steps may take, on any thread."""
+    goals.subscription(MAIN, 0x22, "/polled", node=0x1)
+    goals.python(MAIN, 5, "function node:heard (goes on)")
+    hear(goals, 0x20, 0xCA, 11)
+    goals.python(MAIN, 1, "step")
+    goals.end(MAIN, 0xCA)
+    for handle, stamp in ((0x22, 21), (0x31, 31), (0x32, 32)):
+        goals.ready(MAIN)
+        goals.take(MAIN, handle, stamp, layers="rmw rcl")
+    resume(goals, 1, 5, POOL)
+    goals.publish(POOL, 0x10, 1, layers="rcl rmw")
+    goals.take(POOL, 0x31, 33, layers="rmw rcl")
+    goals.take(POOL, 0x32, 34, layers="rmw rcl")
+    goals.take(POOL, 0x22, 22, layers="rmw rcl")
+    goals.publish(POOL, 0x10, 2, layers="rcl rmw")
+    goals.end(POOL, 5)
+    resume(goals, 1, 5)
+    goals.publish(MAIN, 0x10, 3, layers="rcl rmw")
+    goals.end(MAIN, 5)
+    assert sorted(analyse(goals).rows(CAUSES)) == [
+        (1, 11, "direct", 1),
+        (2, 11, "direct", 1),
+        (2, 22, "polled", 1),
+        (3, 11, "direct", 1),
+        (3, 22, "polled", 1),
+    ]

@@ -141,3 +141,92 @@ def test_the_middleware_answers_nothing(relay: RosSystem, analyse: Analyse) -> N
     model = analyse(relay)
     assert model.rows("SELECT count(*) FROM publication WHERE publisher_id IS NULL") == [(1,)]
     assert [row[:2] for row in model.rows(LINKS)] == [(2, 11)]
+
+
+MARKED = (
+    "SELECT b.source_timestamp_ns, t.source_timestamp_ns, l.candidate_count "
+    "FROM link_causal AS l JOIN publication AS b USING (publication_id) "
+    "LEFT JOIN take AS t ON l.take_id = t.take_id ORDER BY b.publication_id"
+)
+
+
+@pytest.fixture
+def asker(relay: RosSystem) -> RosSystem:
+    """The one in the middle sends goals, too; it answered feedback before, and has no timer."""
+    relay.node(PYTHON, 0x1, "asker")
+    relay.client(PYTHON, 0x30, "/dock/_action/send_goal", gid=7)
+    relay.subscription(PYTHON, 0x31, "/dock/_action/feedback")
+    relay.subscription(PYTHON, 0x32, "/dock/_action/status")
+    relay.publisher(PYTHON, 0x12, "/fed")
+    relay.publisher(PYTHON, 0x13, "/done")
+    relay.send_request(PYTHON, 0x30, 1)
+    relay.take_request(SOURCE, 0x40, 1, gid=7)
+    for stamp, apart in enumerate((1, 7, 2, 9, 30, 5), start=101):
+        relay.take(PYTHON, 0x31, stamp, layers="rmw rcl")
+        relay.publish(PYTHON, 0x12, stamp + 100, layers="rcl rmw")
+        relay.wait(1_000 * apart)
+    return relay
+
+
+@pytest.mark.parametrize(
+    ("events", "links"),
+    [
+        # The states of goals cause nothing.
+        ("F P", [(1, 31, 1)]),
+        ("F S P", [(1, 31, 1)]),
+        ("S F P", [(1, 31, 1)]),
+        # What waits for a response goes on behind what was ready with it.
+        ("R P", []),
+        ("R F P D", [(1, 31, 2), (2, 31, 2)]),
+        ("F P R F P", [(1, 31, 1), (1, 31, 2)]),
+    ],
+)
+def test_what_clients_of_actions_take_at_once(
+    asker: RosSystem, analyse: Analyse, events: str, links: list[tuple[int, int, int]]
+) -> None:
+    for event in events.split():
+        match event:
+            case "F":
+                asker.take(PYTHON, 0x31, 31, layers="rmw rcl")
+            case "S":
+                asker.take(PYTHON, 0x32, 32, layers="rmw rcl")
+            case "R":
+                asker.take_response(PYTHON, 0x30, 1)
+            case "P":
+                asker.publish(PYTHON, 0x12, 1, layers="rcl rmw")
+            case "D":
+                asker.publish(PYTHON, 0x13, 2, layers="rcl rmw")
+    # It also publishes by itself: else each would be an answer.
+    asker.publish(Thread(200, 201), 0x12, 0, layers="rcl rmw")
+    assert analyse(asker).rows(MARKED)[6:] == links
+
+
+@pytest.mark.parametrize(
+    ("more", "count"), [("", 1), ("take", 1), ("take take", 2), ("publish", 2), ("other", 2)]
+)
+def test_each_message_has_its_answer(
+    asker: RosSystem, analyse: Analyse, more: str, count: int
+) -> None:
+    """And nothing else is published: then a response changes nothing."""
+    asker.take_response(PYTHON, 0x30, 1)
+    asker.take(PYTHON, 0x31, 31, layers="rmw rcl")
+    asker.publish(PYTHON, 0x12, 1, layers="rcl rmw")
+    for one in more.split():
+        asker.wait(50_000)
+        if one != "publish":
+            asker.take(PYTHON, 0x20 if one == "other" else 0x31, 41, layers="rmw rcl")
+        if one != "take":
+            asker.publish(PYTHON, 0x12, 2, layers="rcl rmw")
+    assert analyse(asker).rows(MARKED)[6] == (1, 31, count)
+
+
+def test_who_executes_goals_may_publish_for_these(asker: RosSystem, analyse: Analyse) -> None:
+    """As soon as it took the first one."""
+    asker.service(PYTHON, 0x41, "/move/_action/send_goal", callback=None)
+    for wait in (1_000, 9_000):
+        asker.wait(wait)
+        asker.take(PYTHON, 0x31, wait, layers="rmw rcl")
+        asker.publish(PYTHON, 0x12, 1, layers="rcl rmw")
+        asker.take_request(PYTHON, 0x41, wait, gid=7)
+    asker.publish(PYTHON, 0x12, 2, layers="rcl rmw")
+    assert analyse(asker).rows(MARKED)[6:] == [(1, 1_000, 1), (1, 9_000, 2)]

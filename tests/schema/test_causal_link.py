@@ -34,6 +34,7 @@ CREATE TABLE link (run_id BIGINT DEFAULT 1, callback_instance_id BIGINT, take_id
     annotation_id BIGINT, candidate_count BIGINT DEFAULT 1, is_loss_affected BOOLEAN);
 CREATE TABLE answer_doubtful (publication_id BIGINT);
 CREATE MACRO derive.answer_doubtful(only_run, links) AS TABLE FROM answer_doubtful;
+CREATE MACRO derive.answer_to_call(only_run, links) AS TABLE FROM answer_doubtful;
 INSERT INTO store.take (take_id) VALUES (1), (2);
 """
 RULES = ("causal_link", "link_causal_by_hand", "link_causal_annotated")

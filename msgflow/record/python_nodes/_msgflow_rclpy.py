@@ -766,11 +766,9 @@ def _take_data(original):
     def take_data(self):
         data = original(self)
         if _is_recorded and isinstance(data, dict):
-            # In this order they were taken, and callbacks run.
-            last = [
-                key for key in ("goal", "cancel", "result", "feedback", "status") if key in data
-            ]
-            _thread.is_unclear = len(last) > 1 and last[-1] != "feedback"
+            # Only the callback of feedback is called then, if there is feedback.
+            taken = {"goal", "cancel", "result", "status"}.intersection(data)
+            _thread.is_unclear = len(taken) > 1 and "feedback" not in data
         return data
 
     return take_data

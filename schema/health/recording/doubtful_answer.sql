@@ -1,7 +1,8 @@
 -- title: A node may publish by a timer what seems to answer messages
 -- description: A node without traced callbacks (rclpy, wait sets) publishes after messages, but not
 --     as answers come: at the times of a timer, at intervals that the messages do not have, more
---     often than usual, after a message to another node, after a sleep, or too rarely to tell. Such
+--     often than usual, after a message to another node, after a sleep, or too rarely to tell. Or
+--     its node took a response or a goal, too, which may be the reason. Such
 --     links are marked by candidate_count 2 in link_causal, and flows, paths and latencies do not
 --     follow them.
 -- cause: Timers of rclpy emit no event when they fire, and loops with a clock of their own none

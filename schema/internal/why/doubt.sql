@@ -24,7 +24,8 @@ touching AS (
     WHERE list_contains($runs, f.run_id)
         AND f.severity IN ('error', 'warning')
         AND f.name NOT IN (
-            'busy_waiting', 'executor_preempted', 'never_taken', 'not_woken', 'started_late'
+            'busy_waiting', 'executor_preempted', 'hanging_callback', 'never_taken', 'not_woken',
+            'started_late', 'untaken_request'
         )
         AND (f.name <> 'dead_end' OR list_contains((SELECT begins FROM step), n.full_name))
         AND (

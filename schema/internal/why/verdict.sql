@@ -84,6 +84,15 @@ said AS (
                 'its thread is asked for %.0f %% of its time: %d callbacks like %s, %s every %s',
                 100 * load, count, name, run, main.duration_text(period_ns)
             )
+            WHEN 'hangs' THEN printf('%s never ends', name) || coalesce(
+                printf(': its request to %s', service_name) || CASE reason
+                    WHEN 'untaken' THEN ' was answered, and nobody took the answer'
+                    WHEN 'own' THEN ' of its own process was never answered'
+                    ELSE ' was never answered'
+                END,
+                ''
+            )
+            WHEN 'untaken' THEN reason
             WHEN 'burst' THEN printf(
                 '%s sends up to %d messages on %s at once, every %s',
                 coalesce(long_name, 'it'), count, topic, main.duration_text(period_ns)
@@ -163,7 +172,10 @@ said AS (
         list_filter(
             [
                 CASE
-                    WHEN kind IN ('restart', 'never_matched', 'late_start') THEN NULL
+                    WHEN kind = 'hangs' AND is_supposed THEN 'a synchronous call: use call_async'
+                        ' and await it, or give the client a callback group and a thread of its own'
+                    WHEN kind IN ('hangs', 'restart', 'never_matched', 'late_start', 'untaken')
+                        THEN NULL
                     ELSE printf(
                         'data on %s are %s older by it on average',
                         regexp_replace(path, ' → .* → ', ' → … → '), main.duration_text(harm_ns)

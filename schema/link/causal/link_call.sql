@@ -141,9 +141,16 @@ LEFT JOIN independent AS i
 LEFT JOIN store.response AS r ON l.response_id = r.response_id
 JOIN store.thread AS h ON l.thread_id = h.thread_id
 JOIN store.process AS p ON h.process_id = p.process_id
--- That a request leads to its own response goes without saying.
+-- That a request leads to its own response goes without saying. A question for a result leads to
+-- nothing else: it waits for the goal.
 WHERE l.taken_response_id IS NOT NULL
     OR l.taken_request_id IS NOT NULL AND l.taken_request_id IS DISTINCT FROM r.request_id
+    AND l.taken_request_id NOT IN (
+        SELECT q.request_id
+        FROM store.request AS q
+        JOIN store.service AS v ON q.service_id = v.service_id
+        WHERE v.service_name LIKE '%/\_action/get\_result' ESCAPE '\'
+    )
 UNION ALL
 SELECT
     only_run, NULL, i.response_id, s.publication_id, s.publisher_id, s.request_id,

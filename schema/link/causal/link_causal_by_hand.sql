@@ -24,6 +24,8 @@ doubtful AS (
     FROM (
         SELECT publication_id FROM derive.answer_doubtful(only_run, 'adjacent')
         UNION
+        SELECT publication_id FROM derive.answer_to_call(only_run, 'adjacent')
+        UNION
         SELECT publication_id FROM slept
     ) AS l
     JOIN adjacent AS a ON l.publication_id = a.publication_id

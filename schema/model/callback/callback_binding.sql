@@ -73,6 +73,34 @@ FROM behind
 WHERE is_request
 WINDOW same AS (PARTITION BY event_id);
 
+-- Functions of Python that begin right after a client of an action took the states of goals. What
+-- it takes at once it takes in this order, and only feedback has a callback that is called then
+-- (NULL: there was none, or the function goes on for something earlier).
+-- when: staging.python_mark WHERE kind = 'python'
+-- columns: start_event_id BIGINT, called_by_event_id BIGINT
+CREATE OR REPLACE TEMP TABLE callback_feedback AS
+WITH message AS (
+    SELECT t.start_event_id, t.end_event_id, t.thread_id, s.topic_name
+    FROM staging.take_chain AS t
+    JOIN staging.subscription_known AS s ON t.subscription_event_id = s.event_id
+    WHERE s.topic_name LIKE '%/\_action/%' ESCAPE '\'
+)
+SELECT
+    r.start_event_id,
+    CASE
+        WHEN m.event_id IS NULL AND f.start_event_id > coalesce(r.previous_callback_event_id, 0)
+            THEN f.end_event_id
+    END AS called_by_event_id
+FROM staging.callback_run AS r
+JOIN message AS s ON r.previous_event_id = s.end_event_id AND s.topic_name LIKE '%/status'
+LEFT JOIN (FROM staging.python_mark WHERE kind = 'resume') AS m
+    ON r.thread_id = m.thread_id
+    AND r.previous_callback_event_id IS NOT DISTINCT FROM m.previous_callback_event_id
+ASOF LEFT JOIN message AS f
+    ON r.thread_id = f.thread_id
+    AND replace(s.topic_name, '/status', '/feedback') = f.topic_name
+    AND s.start_event_id > f.start_event_id;
+
 WITH begun AS NOT MATERIALIZED (
     SELECT
         start_event_id AS event_id,
@@ -106,10 +134,12 @@ run AS (
         -- As recorded: what the executor said after the take stands, whatever else was lost. It is
         -- NULL only where the thread had no executor event at all.
         CASE
+            WHEN k.kind = 'function' AND a.start_event_id IS NOT NULL THEN a.called_by_event_id
             WHEN coalesce(b.previous_executor_event_id < b.previous_event_id, true)
                 THEN b.previous_event_id
         END AS called_by_event_id
     FROM staging.with_latest('begun', 'known') AS b
+    LEFT JOIN callback_feedback AS a ON b.event_id = a.start_event_id
     LEFT JOIN staging.callback_known AS k ON b.object_event_id = k.event_id
     LEFT JOIN first_run AS f
         ON b.object_event_id IS NULL AND b.process_id = f.process_id AND b.handle = f.handle

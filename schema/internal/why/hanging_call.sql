@@ -1,0 +1,26 @@
+-- title: Callbacks that never end
+-- description: With the request that is the last that their threads did, if it is.
+-- grain: one row per thread
+-- reads: callback_name
+-- next: flow --callback-instance {callback_instance_id}
+-- column: node VARCHAR  Node
+-- column: callback VARCHAR  What triggers it
+-- column: function VARCHAR  Its function, without its module; NULL: not known
+-- column: callback_instance_id BIGINT  The instance that does not end
+-- column: open_ns BIGINT [ns]  From its start to the end of the recording
+-- column: service_name VARCHAR  Service that the request is to; NULL: it did something else last
+-- column: is_answered BOOLEAN  The answer was sent, though not taken
+-- column: is_own BOOLEAN  The service is of its process
+SELECT
+    n.node, n.callback, n.function, i.callback_instance_id,
+    r.end_ns - i.start_ns AS open_ns,
+    q.service_name,
+    q.response_id IS NOT NULL AS is_answered,
+    q.is_own
+FROM main.finding AS f
+JOIN main.callback_instance AS i ON f.thread_id = i.thread_id AND i.end_ns IS NULL
+JOIN callback_name AS n ON i.callback_id = n.callback_id
+JOIN main.run AS r ON f.run_id = r.run_id
+LEFT JOIN derive.last_request AS q ON i.callback_instance_id = q.callback_instance_id
+WHERE list_contains($runs, f.run_id) AND f.name = 'hanging_callback'
+QUALIFY row_number() OVER (PARTITION BY f.thread_id ORDER BY i.start_ns DESC) = 1
