@@ -4,8 +4,8 @@
 -- cause: Files of the trace were not copied. Or its nodes did not run, ran as another user than the
 --     session, or run with a tracetools that was built without LTTng.
 -- cure: Compare the files with those on the recording host. Of a trace of programs, ros2 run
---     tracetools status must say in the environment of the nodes that tracing is enabled; if it does
---     not, build tracetools with LTTng installed.
+--     tracetools status must say in the environment of the nodes that tracing is enabled; if it
+--     does not, build tracetools with LTTng installed.
 -- grain: one row per trace
 -- severity: warning
 -- when: staging.trace WHERE event_count = 0
