@@ -110,8 +110,9 @@ every_output AS MATERIALIZED (
     JOIN published AS p ON d.node_id = p.node_id
     WHERE d.leading_count = 0
         OR p.timer_id IS NOT NULL AND NOT EXISTS (
-            FROM published AS o
-            JOIN published AS j ON o.publisher_id = j.publisher_id
+            FROM (SELECT DISTINCT publisher_id, trigger_id FROM published) AS o
+            JOIN (SELECT DISTINCT publisher_id, trigger_id FROM published) AS j
+                ON o.publisher_id = j.publisher_id
             WHERE o.trigger_id = d.subscription_id AND j.trigger_id <> d.subscription_id
         )
     GROUP BY ALL

@@ -472,7 +472,8 @@ def _start_as_job(thread):
 def _job(function, named=None, is_thread=False):
     """Return a function that goes on, on another thread, because of what runs now."""
     try:
-        function = getattr(function, "_msgflow_job", function)
+        if inspect.isfunction(function):
+            function = vars(function).get("_msgflow_job", function)
         named = named or function
         module = getattr(named, "__module__", None) or ""
         if not callable(named) or module.partition(".")[0] in _MACHINERY:
@@ -579,7 +580,11 @@ def _receive(source, step, caller):
             _begin_job(_numbered(symbol, caller), step, True, source)
     elif job[3] and job[4] is None:
         # A thread that gets a second one works for all.
-        _thread.job = (*job[:4], source)
+        if step:
+            _end_job()
+            _begin_job(job[0], step, True, source)
+        else:
+            _thread.job = (*job[:4], source)
     elif job[4] is not None and step not in (0, job[1]):
         # It may be for either.
         _end_job()
@@ -688,6 +693,9 @@ def _wait_for_ready_callbacks(original):
         if not was_recorded:
             _announce_again()
         try:
+            # What its thread got before is over: now it works for all.
+            if not _thread.depth:
+                _end_job()
             # A callback that spins is in a thread of a pool all the same.
             _thread.is_spinning = _thread.is_spinning or not _thread.depth
             _work_for(self)
