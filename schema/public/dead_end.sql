@@ -109,7 +109,12 @@ every_output AS MATERIALIZED (
     FROM idle AS d
     JOIN published AS p ON d.node_id = p.node_id
     WHERE d.leading_count = 0
-        OR p.timer_id IS NOT NULL AND NOT EXISTS (
+        -- A node that passes on little may filter, beside a state that it publishes for nobody.
+        OR p.timer_id IS NOT NULL AND EXISTS (
+            FROM store.publisher AS b
+            JOIN store.subscription AS s ON b.run_id = s.run_id AND b.topic_name = s.topic_name
+            WHERE b.publisher_id = p.publisher_id
+        ) AND NOT EXISTS (
             FROM (SELECT DISTINCT publisher_id, trigger_id FROM published) AS o
             JOIN (SELECT DISTINCT publisher_id, trigger_id FROM published) AS j
                 ON o.publisher_id = j.publisher_id

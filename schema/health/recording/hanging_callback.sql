@@ -47,10 +47,10 @@ SELECT
             WHEN a.sent_ns IS NOT NULL THEN printf(
                 'its request to %s was answered at %.3f s, and nobody took the answer: a'
                 ' synchronous call, in a callback that keeps its executor or group busy',
-                d.service_name, (a.sent_ns - r.start_ns) / 1e9
+                coalesce(d.service_name, 'a service'), (a.sent_ns - r.start_ns) / 1e9
             )
             WHEN d.is_own IS NOT NULL THEN printf(
-                'its request to %s%s was never answered', d.service_name,
+                'its request to %s%s was never answered', coalesce(d.service_name, 'a service'),
                 CASE WHEN d.is_own THEN ' of its own process' ELSE '' END
             )
             WHEN p.last_seen_ns > h.last_seen_ns + 500_000_000

@@ -18,15 +18,18 @@ WITH message AS (
     JOIN store.take AS t ON l.take_id = t.take_id
     JOIN store.process AS p ON b.process_id = p.process_id
     JOIN store.process AS o ON t.process_id = o.process_id AND p.host_id = o.host_id
+    WHERE l.run_id = $run_id
 ),
 judged AS (
     SELECT
         m.*,
         w.state = 'wait'
-        AND m.taken_ns - m.next_ns BETWEEN 0 AND 0.2 * (m.next_ns - m.end_ns) AS is_behind,
+        AND m.taken_ns - m.next_ns BETWEEN 0 AND 0.2 * (m.next_ns - m.end_ns)
+        -- One that is on its way for a little longer than a period comes later, or at any time.
+        AND m.taken_ns - m.next_ns <= 1_000_000 AS is_behind,
         min(m.taken_ns) FILTER (is_behind) OVER (PARTITION BY m.subscription_id) AS first_ns
     FROM message AS m
-    ASOF JOIN store.executor_state AS w
+    ASOF JOIN (FROM store.executor_state WHERE run_id = $run_id) AS w
         ON m.thread_id = w.thread_id AND m.next_ns >= w.start_ns
 )
 SELECT

@@ -1,8 +1,8 @@
 -- title: A service that takes no more requests
 -- description: Requests were sent until the end, and from some moment on the service took none, in
---     half a second or longer, and ten times as long as usual, though its process went on. Who sent
---     them waits, or goes on without an answer. What its thread ran meanwhile most of the time is
---     named.
+--     half a second or longer, ten times as long as usual and twice as long as ever, though its
+--     process went on. Who sent them waits, or goes on without an answer. What its thread ran
+--     meanwhile most of the time is named.
 -- cause: Its executor has something else to run whenever it looks: timers and subscriptions come
 --     before services. Or a callback never ends, or the two do not reach each other any more.
 -- cure: Make what it runs meanwhile shorter than its period, or give the service a callback group
@@ -29,7 +29,8 @@ WITH sent AS (
             run_id, service_name,
             any_value(service_id) AS service_id
         FROM store.service
-        WHERE NOT is_internal
+        -- Where it records no requests, nobody seems to take them.
+        WHERE NOT is_internal AND process_id IN (SELECT process_id FROM derive.call_traced)
         GROUP BY run_id, service_name
         HAVING count(*) = 1
     ) AS v
@@ -46,13 +47,15 @@ untaken AS MATERIALIZED (
         SELECT
             *,
             count(*) OVER (PARTITION BY service_id) AS requests,
-            quantile_disc(wait_ns, 0.5) OVER (PARTITION BY service_id) AS usual_ns
+            quantile_disc(wait_ns, 0.5) OVER (PARTITION BY service_id) AS usual_ns,
+            max(wait_ns) OVER (PARTITION BY service_id) AS longest_ns
         FROM sent
     )
     WHERE sent_ns > coalesce(last_ns, 0) AND sent_ns < end_ns - 500_000_000
     GROUP BY service_id, start_ns, end_ns
     HAVING (count(*) >= 3 OR any_value(usual_ns) IS NOT NULL)
         AND end_ns - since_ns > 10 * coalesce(any_value(usual_ns), 0)
+        AND end_ns - since_ns > 2 * coalesce(any_value(longest_ns), 0)
 ),
 -- What threads of its node ran most of the time.
 meanwhile AS (

@@ -1,5 +1,7 @@
 -- title: Callbacks that never end
--- description: With the request that is the last that their threads did, if it is.
+-- description: With the request that is the last that their threads did, if it is. The execution of a
+--     goal may take longer than the recording, and so may what runs for the first time, unless it
+--     waits for an answer.
 -- grain: one row per thread
 -- reads: callback_name
 -- next: flow --callback-instance {callback_instance_id}
@@ -20,7 +22,16 @@ SELECT
 FROM main.finding AS f
 JOIN main.callback_instance AS i ON f.thread_id = i.thread_id AND i.end_ns IS NULL
 JOIN callback_name AS n ON i.callback_id = n.callback_id
+JOIN main.callback AS c ON i.callback_id = c.callback_id
 JOIN main.run AS r ON f.run_id = r.run_id
 LEFT JOIN derive.last_request AS q ON i.callback_instance_id = q.callback_instance_id
 WHERE list_contains($runs, f.run_id) AND f.name = 'hanging_callback'
+    AND c.kind <> 'action'
+    AND (
+        q.callback_instance_id IS NOT NULL
+        OR EXISTS (
+            FROM main.callback_instance AS o
+            WHERE o.callback_id = i.callback_id AND o.end_ns IS NOT NULL
+        )
+    )
 QUALIFY row_number() OVER (PARTITION BY f.thread_id ORDER BY i.start_ns DESC) = 1

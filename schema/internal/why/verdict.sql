@@ -84,7 +84,7 @@ said AS (
                 'its thread is asked for %.0f %% of its time: %d callbacks like %s, %s every %s',
                 100 * load, count, name, run, main.duration_text(period_ns)
             )
-            WHEN 'hangs' THEN printf('%s never ends', name) || coalesce(
+            WHEN 'hangs' THEN printf('%s does not end', name) || coalesce(
                 printf(': its request to %s', service_name) || CASE reason
                     WHEN 'untaken' THEN ' was answered, and nobody took the answer'
                     WHEN 'own' THEN ' of its own process was never answered'
@@ -172,8 +172,8 @@ said AS (
         list_filter(
             [
                 CASE
-                    WHEN kind = 'hangs' AND is_supposed THEN 'a synchronous call: use call_async'
-                        ' and await it, or give the client a callback group and a thread of its own'
+                    WHEN kind = 'hangs' AND is_supposed THEN 'a synchronous call: let the callback'
+                        ' return, or give the client a callback group and a thread of its own'
                     WHEN kind IN ('hangs', 'restart', 'never_matched', 'late_start', 'untaken')
                         THEN NULL
                     ELSE printf(
