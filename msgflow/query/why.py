@@ -168,7 +168,7 @@ class _Questions:
             *(cure for word, cure in _RECORDED_BY.items() if word in verdict["lacks"].to_pylist()),
             *(
                 f"without the first {start.removesuffix('s')} s, a warm-up: the longest latencies"
-                " lie there (--start 0s reads them, too)"
+                " of some paths lie there (--start 0s reads them, too)"
                 for start in since[1:]
             ),
             *_outlier(self.run, paths.table.to_pylist()[0]),

@@ -95,8 +95,10 @@ def ros_processes() -> list[tuple[str, int]]:
     found = []
     for process in lttng("list", "--userspace").iterfind(".//{*}pid"):
         names = [_text(event, "name") for event in process.iterfind(".//{*}event")]
-        if any(name.startswith("ros2:") for name in names):
-            found.append((_text(process, "name"), int(_text(process, "id"))))
+        name = _text(process, "name")
+        # LTTng's own programs have what a user preloads for the nodes.
+        if not name.startswith("lttng-") and any(each.startswith("ros2:") for each in names):
+            found.append((name, int(_text(process, "id"))))
     return found
 
 

@@ -17,6 +17,8 @@ LISTED = rb"""#!/bin/sh
 printf '<command><pids><pid><id>7</id><name>a\033\377b</name>'
 printf '<events><event><name>ros2:rcl_init</name></event></events></pid>'
 printf '<pid><id>8</id><name>c</name><events><event><name>other:x</name></event></events></pid>'
+printf '<pid><id>9</id><name>lttng-consumerd</name>'
+printf '<events><event><name>ros2:rcl_init</name></event></events></pid>'
 printf '</pids></command>'
 """
 

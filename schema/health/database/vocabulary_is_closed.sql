@@ -22,7 +22,7 @@ WITH foreign_word AS (
     UNION ALL
     SELECT DISTINCT run_id, 'callback.kind', kind
     FROM store.callback
-    WHERE kind NOT IN ('subscription', 'timer', 'service', 'function', 'unknown')
+    WHERE kind NOT IN ('subscription', 'timer', 'service', 'action', 'function', 'unknown')
     UNION ALL
     SELECT DISTINCT run_id, 'annotation.kind', kind
     FROM store.annotation
