@@ -44,3 +44,17 @@ def test_no_wrong_link_and_a_finding(
     assert (score.wrong, score.misguessed) == (0, 0)
     assert score.recall >= linked
     assert told in {finding.name for finding in findings}
+
+
+def test_a_start_that_says_nothing_tells_of_no_step(tmp_path: Path) -> None:
+    """While nodes start, another difference of the clocks explains as much: the one line holds."""
+    simulation = simulate("host_chain", tmp_path / "trace", factor=0.3, layout="iron", seed=924454)
+    database = tmp_path / "run.duckdb"
+    findings = ingest([simulation.directory], database).findings
+    (score,) = (
+        each
+        for each in compare_simulated(database, simulation.truth)[0]
+        if each.kind == "transport"
+    )
+    assert (score.wrong, score.misguessed, score.recall) == (0, 0, 1)
+    assert "clock_set" not in {finding.name for finding in findings}

@@ -50,7 +50,7 @@ followed AS (
 course AS MATERIALIZED (
     SELECT
         f.clock_id, f.segment, f.stretch, f.difference_ns, r.at_ns, r.start_ns, r.end_ns,
-        r.most_count,
+        r.least_ns, r.greatest_ns, r.most_count,
         r.most_count / r.message_count AS share,
         CASE WHEN r.is_taken_here THEN f.is_soon ELSE f.is_alone_mostly END AS is_told
     FROM followed AS f
@@ -82,20 +82,45 @@ divided AS MATERIALIZED (
         )
     FROM judged
 ),
+line AS MATERIALIZED (FROM derive.stamp_line('pair', 'divided')),
+-- A clock that was never set.
+only_line AS (
+    SELECT
+        clock_id,
+        any_value(segment) AS segment,
+        any_value(middle_ns) AS middle_ns,
+        any_value(difference_ns) AS difference_ns,
+        any_value(drift_ppb) AS drift_ppb,
+        any_value(slack_ns) AS slack_ns
+    FROM line
+    GROUP BY clock_id
+    HAVING count(DISTINCT segment) = 1
+),
+-- What is not told does not say that such a clock was set, if the line may hold there.
 -- Where a clock was set back, messages of two times have the same stamps: no difference explains
 -- as many as usual.
 told AS (
     SELECT
-        c.clock_id, c.stretch, c.start_ns, c.end_ns, l.segment, l.middle_ns, l.difference_ns,
-        l.drift_ppb, l.slack_ns,
-        coalesce(l.agrees, false)
+        c.clock_id, c.stretch, c.start_ns, c.end_ns,
+        coalesce(l.segment, o.segment) AS segment,
+        coalesce(l.middle_ns, o.middle_ns) AS middle_ns,
+        coalesce(l.difference_ns, o.difference_ns) AS difference_ns,
+        coalesce(l.drift_ppb, o.drift_ppb) AS drift_ppb,
+        coalesce(l.slack_ns, o.slack_ns) AS slack_ns,
+        coalesce(
+            l.agrees,
+            NOT c.is_told
+            AND o.difference_ns + ((c.at_ns - o.middle_ns) * o.drift_ppb / 1e9)::BIGINT
+                BETWEEN c.least_ns AND c.greatest_ns,
+            false
+        )
         AND (
-            min(l.segment) OVER on_clock = max(l.segment) OVER on_clock
+            o.clock_id IS NOT NULL
             OR c.share >= derive.clock_limit().unmixed_share * max(c.share) OVER on_clock
         ) AS agrees
     FROM course AS c
-    LEFT JOIN derive.stamp_line('pair', 'divided') AS l
-        ON c.clock_id = l.clock_id AND c.stretch = l.stretch
+    LEFT JOIN line AS l ON c.clock_id = l.clock_id AND c.stretch = l.stretch
+    LEFT JOIN only_line AS o ON c.clock_id = o.clock_id
     WINDOW on_clock AS (PARTITION BY c.clock_id)
 ),
 certain AS (
