@@ -48,7 +48,7 @@ def test_no_wrong_link_and_a_finding(
 
 def test_a_start_that_says_nothing_tells_of_no_step(tmp_path: Path) -> None:
     """While nodes start, another difference of the clocks explains as much: the one line holds."""
-    simulation = simulate("host_chain", tmp_path / "trace", factor=0.3, layout="iron", seed=924454)
+    simulation = simulate("host_chain", tmp_path / "trace", factor=1, layout="iron", seed=924454)
     database = tmp_path / "run.duckdb"
     findings = ingest([simulation.directory], database).findings
     (score,) = (
