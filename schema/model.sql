@@ -16,7 +16,7 @@ CREATE TABLE staging.callback (callback_id BIGINT, process_id BIGINT, node_id BI
 CREATE TABLE staging.callback_binding (start_event_id BIGINT, process_id BIGINT,
     callback_handle UBIGINT, is_intra_process BOOLEAN, callback_event_id BIGINT, kind VARCHAR,
     take_event_id BIGINT, subscription_event_id BIGINT, request_event_id BIGINT,
-    call_event_id BIGINT, response_event_id BIGINT);
+    call_event_id BIGINT, response_event_id BIGINT, step_event_id BIGINT);
 CREATE TABLE staging.callback_counter (callback_instance_id BIGINT, name VARCHAR, value HUGEINT);
 CREATE TABLE staging.callback_cpu (callback_instance_id BIGINT, cpu_ns HUGEINT, cpu_source VARCHAR);
 CREATE TABLE staging.callback_end_alone (event_id BIGINT, trace_index INTEGER,

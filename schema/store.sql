@@ -226,6 +226,8 @@ CREATE TABLE store.callback_instance (
     response_id BIGINT,  -- Response that it follows from, in Python {to response}
     continues_id BIGINT,  -- Callback instance that it is a later step of, in Python; NULL: it is
         -- the first {to callback_instance}
+    step_event_id BIGINT,  -- Where the tracer of Python told that it would go on: what a job starts
+        -- has that of the job; NULL: it is no later step [event order] {hidden}
     is_intra_process BOOLEAN DEFAULT false NOT NULL,  -- Called with an intra-process message
     parent_id BIGINT,  -- Callback instance that it is nested in {to callback_instance}
     depth INTEGER NOT NULL,  -- Nesting depth on its thread, from 1

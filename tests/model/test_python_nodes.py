@@ -111,6 +111,23 @@ def calls(python: RosSystem) -> RosSystem:
     return python
 
 
+def test_jobs_of_what_is_done_with_a_response(calls: RosSystem, analyse: Analyse) -> None:
+    calls.ready(MAIN)
+    taken = calls.take_response(MAIN, 0x30, 1, stamp=1)
+    calls.python(MAIN, 1, "step")
+    resume(calls, 1, 6)
+    calls.python(MAIN, 2, "step")
+    calls.end(MAIN, 6)
+    job(calls, 2, 5, 1)
+    analysis = analyse(calls)
+    assert analysis.rows(
+        "SELECT b.source_timestamp_ns, r.taken_ns, l.candidate_count FROM link_call AS l "
+        "JOIN publication AS b USING (publication_id) "
+        "JOIN response AS r ON l.taken_response_id = r.response_id"
+    ) == [(1, taken, 1)]
+    assert analysis.rows(CAUSES) == []
+
+
 def test_what_is_done_with_a_response(calls: RosSystem, analyse: Analyse) -> None:
     """In tasks of their own, in any order: each knows its response."""
     taken = []
@@ -257,6 +274,47 @@ def test_timers_that_jobs_start_again(python: RosSystem, analyse: Analyse) -> No
     job(python, 1, 5, 2, POOL)
     python.idle(MAIN)
     assert analyse(python).rows(CAUSES) == [(1, 11, "direct", 1), (2, 11, "direct", 2)]
+
+
+@pytest.mark.parametrize("is_pool", [True, False])
+def test_jobs_side_by_side_are_each_of_their_own(
+    python: RosSystem, analyse: Analyse, is_pool: bool
+) -> None:
+    """A callback starts both, and each publishes once. What its node keeps is no cause."""
+    python.python(MAIN, 5, "function node:work")
+    expected = []
+    for stamp in (11, 13, 15, 17):
+        hear(python, 0x20, 0xCA, stamp)
+        for number in (stamp, stamp + 1):
+            python.python(MAIN, number, "step")
+        python.end(MAIN, 0xCA)
+        for number in (stamp, stamp + 1):
+            hear(python, 0x21, 0xCB, 100 + number)
+            python.end(MAIN, 0xCB)
+            job(python, number, 5, number, POOL if is_pool and number % 2 else OTHER)
+            expected.append((number, stamp, "direct", 1))
+    python.idle(MAIN)
+    analysis = analyse(python)
+    assert analysis.rows(CAUSES) == expected
+    # Their publications are not outside of callbacks.
+    assert analysis.rows("SELECT topic_name, cause FROM dead_end([1])") == [("/b", "from /a")]
+
+
+def test_jobs_of_a_later_step_follow_from_the_first(python: RosSystem, analyse: Analyse) -> None:
+    python.python(MAIN, 5, "function node:heard (goes on)")
+    hear(python, 0x20, 0xCA, 11)
+    python.python(MAIN, 1, "step")
+    python.end(MAIN, 0xCA)
+    resume(python, 1, 5)
+    for number in (2, 3):
+        python.python(MAIN, number, "step")
+    python.end(MAIN, 5)
+    for number in (2, 3):
+        hear(python, 0x21, 0xCB, 20 + number)
+        python.end(MAIN, 0xCB)
+        job(python, number, 6, number)
+    python.idle(MAIN)
+    assert analyse(python).rows(CAUSES) == [(2, 11, "direct", 1), (3, 11, "direct", 1)]
 
 
 @pytest.fixture

@@ -310,10 +310,18 @@ def test_threads_are_as_they_were(robot: Robot) -> None:
             def run(self):
                 return work
 
+        class Bare(threading.Thread):
+            def __init__(self):
+                pass
+
         threading.excepthook = lambda args: print(args.exc_type.__name__)
 
         def heard(message):
             global before
+            try:
+                Bare().start()
+            except RuntimeError as error:
+                print(error)
             worker = Worker(name="mine", daemon=True)
             worker.run = worker.run
             del worker.run
@@ -337,7 +345,8 @@ def test_threads_are_as_they_were(robot: Robot) -> None:
         hear(heard)
         """,
     )
-    assert out[:3] == ["mine True True", "ZeroDivisionError", "threads can only be started once"]
+    assert out[0] == "thread.__init__() not called"
+    assert out[1:4] == ["mine True True", "ZeroDivisionError", "threads can only be started once"]
     assert [job[0] for job in jobs(robot)].count("work") == 2
 
 
@@ -379,6 +388,252 @@ def test_what_a_thread_gets_from_a_queue_goes_on_for_what_put_it_there(robot: Ro
         [*(("loop", number) for number in ("1001", "1002", "1003")), ("loop_later", "1001")]
     )
     assert len(robot.lines("callback_start")) == len(robot.lines("callback_end"))
+
+
+def test_objects_that_answer_everything_are_called_as_ever(robot: Robot) -> None:
+    """As proxies of remote calls, and mocks: what the tracer looks for is not theirs."""
+    out = run_jobs(
+        robot,
+        """
+        from unittest.mock import Mock
+
+        class Method:
+            def __init__(self, name):
+                self.name = name
+
+            def __getattr__(self, more):
+                return Method(self.name + "." + more)
+
+            def __call__(self, *args):
+                print(self.name, *args)
+
+        mock, pool = Mock(), ThreadPoolExecutor(1)
+
+        def heard(message):
+            pool.submit(Method("set"), message).result()
+            pool.submit(mock, message).result()
+            thread = threading.Thread(target=Method("stop"))
+            thread.start()
+            thread.join()
+            print(mock.mock_calls)
+
+        hear(heard)
+        """,
+    )
+    assert out == ["set 1001", "stop", "[call(1001)]", "over"]
+
+
+def test_a_thread_that_one_callback_starts_and_another_feeds(robot: Robot) -> None:
+    """Also the first thing that it gets is for what put it there."""
+    run_jobs(
+        robot,
+        """
+        channel = queue.Queue()
+
+        def loop():
+            while (item := channel.get()) is not None:
+                work(item)
+
+        def started(message):
+            threading.Thread(target=loop, daemon=True).start()
+
+        def heard(message):
+            channel.put(message)
+            results.get()
+
+        hear(started, heard, heard)
+        """,
+    )
+    assert jobs(robot) == [("loop", "1001"), ("loop", "1002"), ("loop", "1003")]
+
+
+@pytest.mark.parametrize("began", ["started by a callback", "got an item"])
+def test_callbacks_of_a_thread_that_spins_are_in_no_job(robot: Robot, began: str) -> None:
+    run_jobs(
+        robot,
+        f"""
+        channel = queue.Queue()
+
+        def loop():
+            if {began == "got an item"}:
+                channel.get()
+            other = executors.SingleThreadedExecutor()
+            for number in (2001, 2002):
+                other.ready.append((subscription.Subscription(number, print), ["inside"]))
+            other.spin_once(), other.spin_once()
+
+        def heard(message):
+            if {began != "got an item"}:
+                thread.start()
+            channel.put(message)
+            thread.join()
+
+        thread = threading.Thread(target=loop)
+        if {began == "got an item"}:
+            thread.start()
+        hear(heard)
+        """,
+    )
+    assert jobs(robot) == [("loop", "1001")]
+    calls = [line for line in robot.traced() if re.match("callback_(start|end)", line)]
+    (job,) = {line.split()[1] for line in calls} - {"1001", "2001", "2002"}
+    assert calls == [
+        "callback_start 1001",
+        f"callback_start {job}",
+        f"callback_end {job}",
+        "callback_start 2001",
+        "callback_end 2001",
+        "callback_start 2002",
+        "callback_end 2002",
+        "callback_end 1001",
+    ]
+
+
+def numbers(robot: Robot, name: str) -> list[str]:
+    """Return the numbers of a function that runs, in the order in which it first runs so."""
+    lines = robot.traced()
+    told = [line.split()[1] for line in lines if line.endswith(f"#msgflow function {name}")]
+    assert len(robot.lines("#msgflow source")) >= len(told) == len(set(told))
+    starts = [line.split()[1] for line in lines if line.startswith("callback_start")]
+    return sorted(set(starts) & set(told), key=starts.index)
+
+
+@pytest.mark.parametrize(
+    ("start", "name"),
+    [
+        ("pool.submit(node.job).result()", "Node.job"),
+        ("thread = threading.Thread(target=node.job); thread.start(); thread.join()", "Node.job"),
+        ("tick(3); results.get()", "tick"),
+        ("channel.put(node); results.get()", "loop"),
+    ],
+)
+def test_jobs_of_two_nodes_of_one_class_are_told_apart(robot: Robot, start: str, name: str) -> None:
+    """Each callback has a job of its own, and only one: also where a job starts itself again."""
+    run_jobs(
+        robot,
+        f"""
+        channel, pool = queue.Queue(), ThreadPoolExecutor(1)
+
+        class Node:
+            def heard(node, message):
+                {start}
+
+            def job(node):
+                pass
+
+        def tick(times):
+            if times:
+                threading.Timer(0, tick, [times - 1]).start()
+            else:
+                work()
+
+        def loop():
+            while channel.get():
+                work()
+
+        threading.Thread(target=loop, daemon=True).start()
+        left, right = Node(), Node()
+        hear(left.heard, right.heard)
+        for number, node in ((1001, left), (1002, right)) * 2:
+            executor.ready.append((subscription.Subscription(number, node.heard), [number]))
+            executor.spin_once()
+        """,
+    )
+    assert len(numbers(robot, f"__main__:{name}")) == 2
+
+
+def test_each_job_of_a_later_step_is_told(robot: Robot) -> None:
+    """What a job starts in turn is no other."""
+    run_jobs(
+        robot,
+        """
+        pool, future = ThreadPoolExecutor(1), executors.Future()
+
+        def part():
+            threading.Timer(0, work).start()
+
+        async def slowly(message):
+            await future
+            pool.submit(part), pool.submit(part)
+
+        hear(slowly)
+        future.is_done = True
+        executor.tasks.pop()()
+        results.get(), results.get()
+        """,
+    )
+    marks = [line.split()[1] for line in robot.lines("#msgflow job")]
+    assert sorted(map(marks.count, set(marks))) == [2, 2]
+    (resumed,) = {line.split()[1] for line in robot.lines("#msgflow resume")}
+    assert resumed not in marks
+
+
+def test_a_thread_that_callbacks_feed_has_a_job_of_each(robot: Robot) -> None:
+    run_jobs(
+        robot,
+        """
+        channel = queue.Queue()
+
+        def loop():
+            while channel.get():
+                work()
+
+        def started(message):
+            threading.Thread(target=loop, daemon=True).start()
+
+        def heard(message):
+            channel.put(message)
+            results.get()
+
+        hear(started, heard, heard)
+        """,
+    )
+    assert len(numbers(robot, "__main__:loop")) == 3
+
+
+def test_steps_of_two_nodes_of_one_class_are_told_apart(robot: Robot) -> None:
+    robot.run("""
+        future = executors.Future()
+
+        async def slowly(message):
+            await future
+
+        one, other = subscription.Subscription(7, slowly), subscription.Subscription(8, slowly)
+        executor.ready = [(one, [1]), (other, [2])]
+        executor.spin_once()
+        later = executor.tasks.pop()
+        executor.spin_once()
+        future.is_done = True
+        later(), executor.tasks.pop()()
+    """)
+    assert len(numbers(robot, "__main__:slowly (goes on)")) == 2
+
+
+def test_what_its_program_takes_out_of_a_queue_leaves_the_later_ones(robot: Robot) -> None:
+    """As a node that drops the oldest message. Whose those were that waited then is not known."""
+    run_jobs(
+        robot,
+        """
+        channel = queue.Queue()
+
+        def loop():
+            while channel.get():
+                work()
+
+        def heard(message):
+            channel.put(message)
+
+        def dropping(message):
+            with channel.mutex:
+                channel.queue.popleft()
+            channel.put(message)
+
+        hear(heard, heard, dropping, heard)
+        threading.Thread(target=loop, daemon=True).start()
+        results.get(), results.get(), results.get()
+        """,
+    )
+    assert jobs(robot) == [("loop", "1003"), ("loop", "1004")]
 
 
 def test_what_may_be_for_either_of_two_goes_on_for_none(robot: Robot) -> None:
@@ -592,6 +847,24 @@ def test_a_tracer_that_turns_itself_off_sees_no_collections(robot: Robot) -> Non
         == "1\nover\n"
     )
     assert not robot.lines("#msgflow collect")
+
+
+def test_what_another_tool_has_wrapped_since_stays(robot: Robot) -> None:
+    code, out, _ = robot.run("""
+        import queue, threading
+        plain = threading.Thread.start
+
+        def start(self):
+            print("started")
+            return plain(self)
+
+        threading.Thread.start = start
+        subscription.Subscription.handle = property(lambda self: 1 / 0, lambda self, to: None)
+        one = subscription.Subscription(7, heard)
+        threading.Thread(target=print, args=["runs"]).start()
+        print(hasattr(plain, "__wrapped__"), hasattr(queue.Queue.get, "__wrapped__"))
+    """)
+    assert (code, out.split()) == (0, ["started", "runs", "True", "False", "over"])
 
 
 def test_python_may_collect_garbage_while_it_ends(robot: Robot) -> None:

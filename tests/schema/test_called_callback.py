@@ -22,7 +22,7 @@ CREATE TABLE staging.callback_known AS
 CREATE TABLE staging.take_chain (start_event_id INTEGER, end_event_id INTEGER, method VARCHAR,
     subscription_event_id INTEGER);
 CREATE TEMP TABLE callback_step (start_event_id INTEGER, request_event_id INTEGER,
-    call_event_id INTEGER, response_event_id INTEGER);
+    call_event_id INTEGER, response_event_id INTEGER, step_event_id INTEGER);
 CREATE TEMP TABLE callback_feedback (start_event_id INTEGER, called_by_event_id INTEGER);
 CREATE MACRO staging.with_latest(uses, objects) AS TABLE
     SELECT u.*, o.event_id AS object_event_id

@@ -61,8 +61,11 @@ _session = 1
 # When the collection of garbage that goes on began; None if it is not recorded.
 _collection_begin = None
 _numbers = itertools.count(1)
-# By symbol, of functions that belong to no subscription, timer or service.
+# Numbers of functions that belong to no subscription, timer or service: by symbol, and by the
+# callback for which they go on (0: none), as nodes of one class have the same functions.
 _functions = {}
+# By number, of these: symbol, source and callback.
+_told = {}
 # By the identity of their callback: subscriptions, timers and services.
 _owners = weakref.WeakValueDictionary()
 # Classes of actions, and of other things that take by themselves.
@@ -84,13 +87,14 @@ class _Thread(threading.local):
     is_waiting = False
     # Tasks that run inside each other.
     depth = 0
-    # Callbacks that run inside each other, or a job of one.
-    calls = 0
+    # Numbers of callbacks that run inside each other, or of a job of one.
+    calls = ()
     # The job: its number, its step, the CPU time at its begin, whether it may get others, and the
     # queue from which it got one.
     job = None
-    # The step in which what was got from a queue was put there; 0: none, or one of this thread.
-    handed = 0
+    # The step in which what was got from a queue was put there, and the callback that did (0: none,
+    # or one of this thread).
+    handed = 0, 0
     # What the running task takes from.
     entity = None
     # The next callback is not for what was taken last.
@@ -185,8 +189,10 @@ def _turn_off(error):
     if not _is_on:
         return
     _is_on = _is_recorded = False
-    for owner, name, original in reversed(_originals):
-        setattr(owner, name, original)
+    for owner, name, original, wrapper in reversed(_originals):
+        # Another tool may have wrapped it since.
+        if getattr(owner, name, None) is wrapper:
+            setattr(owner, name, original)
     if _collect in gc.callbacks:
         gc.callbacks.remove(_collect)
     try:
@@ -206,7 +212,7 @@ def _wrap(owner, name, make):
     wrapper = make(original)
     functools.update_wrapper(wrapper, original)
     setattr(owner, name, wrapper)
-    _originals.append((owner, name, original))
+    _originals.append((owner, name, original, wrapper))
 
 
 # What a process is made of.
@@ -225,17 +231,21 @@ def _register(number, symbol):
 
 def _register_callback(handle, callback):
     _register(handle, _symbol(callback))
-    _register_source(handle, callback)
+    _register_source(handle, _source(callback))
 
 
-def _register_source(number, callback):
+def _register_source(number, source):
+    if source:
+        _register(number, "#msgflow source " + source)
+
+
+def _source(callback):
     while isinstance(callback, functools.partial):
         callback = callback.func
     code = getattr(callback, "__code__", None) or getattr(callback, "f_code", None)
     # An object that can be called has the function of its class.
     code = code or getattr(type(callback).__dict__.get("__call__"), "__code__", None)
-    if inspect.iscode(code):
-        _register(number, "#msgflow source %s:%d" % (code.co_filename, code.co_firstlineno))
+    return "%s:%d" % (code.co_filename, code.co_firstlineno) if inspect.iscode(code) else ""
 
 
 def _begin_anew():
@@ -339,31 +349,41 @@ def _number_of(callback):
 
 def _function(callback, suffix=""):
     """Return the number of a function that no subscription, timer or service has."""
-    return _numbered(_symbol(callback) + suffix, callback)
+    return _numbered(_symbol(callback) + suffix, _origin(), callback)
 
 
-def _numbered(symbol, callback):
-    number = _functions.get(symbol)
+def _origin():
+    """Return the callback for which the thread works: a job works for the one that started it."""
+    number = _thread.calls[-1] if _thread.calls else 0
+    return _told[number][2] if number in _told else number
+
+
+def _numbered(symbol, origin, callback=None, source=""):
+    number = _functions.get((symbol, origin))
     if number is None:
         if len(_functions) >= _MOST_FUNCTIONS:
-            symbol = "(others)"
-        number = _functions.setdefault(symbol, next(_numbers))
+            symbol, origin = "(others)", 0
+        number, source = next(_numbers), source or _source(callback)
+        # Before another thread may get the number.
+        _told[number] = symbol, source, origin
+        number = _functions.setdefault((symbol, origin), number)
         _register(number, "#msgflow function " + symbol)
-        _register_source(number, callback)
+        _register_source(number, source)
     return number
 
 
 def _symbol(callback):
     while isinstance(callback, functools.partial):
         callback = callback.func
-    if not hasattr(callback, "__qualname__"):
+    # An object may answer everything, but not with a name.
+    if not isinstance(getattr(callback, "__qualname__", None), str):
         callback = type(callback)
     return "%s:%s" % (callback.__module__, callback.__qualname__)
 
 
 def _start(number, step, goes_on=b"#msgflow resume"):
     """Begin a callback; return the CPU time of its thread until then."""
-    _thread.calls += 1
+    _thread.calls += (number,)
     if _thread.session != _session:
         _name_thread()
     if step:
@@ -378,7 +398,7 @@ def _start(number, step, goes_on=b"#msgflow resume"):
 
 
 def _end(number, step, begin_ns):
-    _thread.calls -= 1
+    _thread.calls = _thread.calls[:-1]
     end_ns = _cpu_time_ns()
     # What an action does after its first callback goes on because of that.
     if not step and _thread.entity is not None and not hasattr(_thread.entity, "_msgflow"):
@@ -441,10 +461,11 @@ def _passes_on(original):
 
 def _starts(original):
     def start(self):
-        # One that runs already cannot be started.
-        if _thread.calls and _is_recorded and self.ident is None:
+        if _thread.calls and _is_recorded:
             try:
-                _start_as_job(self)
+                # One that runs already cannot be started.
+                if self.ident is None:
+                    _start_as_job(self)
             except Exception:  # A thread like no other.
                 pass
         return original(self)
@@ -479,7 +500,8 @@ def _job(function, named=None, is_thread=False):
         if not callable(named) or module.partition(".")[0] in _MACHINERY:
             return function
         number = _function(named)
-        step = _thread.step or _new_step()
+        # What a job starts goes on with it; what others start, each by itself.
+        step = (_thread.job and _thread.step) or _new_step()
 
         def run(*args, **kwargs):
             if _thread.calls or not _is_recorded:
@@ -512,13 +534,34 @@ def _end_job():
 # What a thread gets from a queue is a job of what put it there: until it gets the next one.
 
 
+class _Handed:
+    """In which step, and by which callback, each item of a queue was put there."""
+
+    __slots__ = ("known", "unknown")
+
+    def __init__(self):
+        # Of the latest items; how many others are before these.
+        self.known = collections.deque()
+        self.unknown = 0
+
+
+def _handed_by(source, count):
+    """Return what is known of the items of a queue; its program may change them, too."""
+    handed = vars(source).setdefault("_msgflow_handed", _Handed())
+    if handed.unknown + len(handed.known) != count:
+        handed.known.clear()
+        handed.unknown = count
+    return handed
+
+
 def _puts(original):
     def _put(self, item):
         original(self, item)
-        if _is_recorded and (_thread.calls or hasattr(self, "_msgflow_steps")):
+        if _is_recorded and (_thread.calls or hasattr(self, "_msgflow_handed")):
             try:
                 step = (_thread.step or _new_step()) if _thread.calls else 0
-                _steps_of(self, len(self.queue) - 1).append((id(item), step, threading.get_ident()))
+                put = (id(item), threading.get_ident(), step, _origin())
+                _handed_by(self, len(self.queue) - 1).known.append(put)
             except Exception:  # A queue like no other.
                 pass
 
@@ -528,11 +571,15 @@ def _puts(original):
 def _got(original):
     def _get(self):
         item = original(self)
-        if hasattr(self, "_msgflow_steps"):
+        if hasattr(self, "_msgflow_handed"):
             try:
-                identity, step, thread = _steps_of(self, len(self.queue) + 1).popleft()
-                if identity == id(item) and thread != threading.get_ident():
-                    _thread.handed = step
+                handed = _handed_by(self, len(self.queue) + 1)
+                if handed.unknown:
+                    handed.unknown -= 1
+                else:
+                    identity, thread, *by = handed.known.popleft()
+                    if identity == id(item) and thread != threading.get_ident():
+                        _thread.handed = by
             except Exception:
                 pass
         return item
@@ -540,27 +587,18 @@ def _got(original):
     return _get
 
 
-def _steps_of(source, count):
-    """Return in which step each item of a queue was put there; its program may change it, too."""
-    steps = vars(source).setdefault("_msgflow_steps", collections.deque())
-    if len(steps) != count:
-        steps.clear()
-        steps.extend([(0, 0, 0)] * count)
-    return steps
-
-
 def _gets(original):
     def get(self, *args, **kwargs):
         # A callback that gets something goes on.
-        if not _is_recorded or _thread.calls > bool(_thread.job):
+        if not _is_recorded or len(_thread.calls) > bool(_thread.job):
             return original(self, *args, **kwargs)
         job = _thread.job
         if job is not None and job[4] is self:
             _end_job()
-        _thread.handed = 0
+        _thread.handed = 0, 0
         item = original(self, *args, **kwargs)
         try:
-            _receive(self, _thread.handed, sys._getframe(1))
+            _receive(self, sys._getframe(1), *_thread.handed)
         except Exception:
             pass
         return item
@@ -568,7 +606,7 @@ def _gets(original):
     return get
 
 
-def _receive(source, step, caller):
+def _receive(source, caller, step, origin):
     job = _thread.job
     if job is None:
         while caller.f_globals.get("__name__") == "queue":
@@ -577,12 +615,13 @@ def _receive(source, step, caller):
         if step and module.partition(".")[0] not in _MACHINERY:
             code = caller.f_code
             symbol = "%s:%s" % (module, getattr(code, "co_qualname", code.co_name))
-            _begin_job(_numbered(symbol, caller), step, True, source)
+            _begin_job(_numbered(symbol, origin, caller), step, True, source)
     elif job[3] and job[4] is None:
         # A thread that gets a second one works for all.
         if step:
             _end_job()
-            _begin_job(job[0], step, True, source)
+            symbol, place, _ = _told[job[0]]
+            _begin_job(_numbered(symbol, origin, source=place), step, True, source)
         else:
             _thread.job = (*job[:4], source)
     elif job[4] is not None and step not in (0, job[1]):

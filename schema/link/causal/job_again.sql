@@ -1,15 +1,15 @@
 -- description: Publications of jobs of Python that go on and on: a thread, or a timer of it, that a
 --     callback started publishes again, after a callback of its node that published nothing. It may
---     use the message of that one. What it published first likewise.
+--     use the message of that one. What it published first likewise. A callback may start several
+--     jobs: each goes on by itself, and with what it starts in turn.
 -- grain: one row per such publication
 CREATE OR REPLACE MACRO derive.job_again(only_run) AS TABLE
 WITH job AS MATERIALIZED (
     SELECT
-        b.publication_id, b.publisher_id, b.start_event_id, p.node_id,
-        i.continues_id AS first_id,
+        b.publication_id, b.publisher_id, b.start_event_id, p.node_id, i.step_event_id,
         f.start_event_id AS begin_event_id,
         lag(b.start_event_id) OVER (
-            PARTITION BY i.continues_id, b.publisher_id ORDER BY b.start_event_id
+            PARTITION BY i.step_event_id, b.publisher_id ORDER BY b.start_event_id
         ) AS before_event_id
     FROM store.callback_instance AS i
     JOIN store.callback_instance AS f ON i.continues_id = f.callback_instance_id
@@ -34,7 +34,7 @@ idle AS (
 ),
 behind AS (
     SELECT
-        j.publication_id, j.first_id, j.publisher_id, j.before_event_id,
+        j.publication_id, j.step_event_id, j.publisher_id, j.before_event_id,
         i.start_event_id > coalesce(j.before_event_id, j.begin_event_id) AS is_behind
     FROM job AS j
     ASOF JOIN idle AS i ON j.node_id = i.node_id AND j.start_event_id > i.start_event_id
@@ -42,4 +42,4 @@ behind AS (
 SELECT publication_id
 FROM behind
 WHERE is_behind
-QUALIFY bool_or(before_event_id IS NOT NULL) OVER (PARTITION BY first_id, publisher_id)
+QUALIFY bool_or(before_event_id IS NOT NULL) OVER (PARTITION BY step_event_id, publisher_id)

@@ -13,10 +13,11 @@
 -- threads of no executor, what is done with a response. Each with what it follows from: the
 -- instance on whose thread, and inside of which, the tracer said so (`step`); else what the thread
 -- took in that turn of its executor, before any callback, a response or a request. Of several that
--- go on for one request, the first is its callback.
+-- go on for one request, the first is its callback. What goes on by itself has one mark of the
+-- tracer, as a job that starts others (`step_event_id`).
 -- when: staging.python_mark WHERE kind IN ('resume', 'job')
--- columns: start_event_id BIGINT, call_event_id BIGINT, response_event_id BIGINT, request_event_id
---     BIGINT
+-- columns: start_event_id BIGINT, step_event_id BIGINT, call_event_id BIGINT, response_event_id
+--     BIGINT, request_event_id BIGINT
 CREATE OR REPLACE TEMP TABLE callback_step AS
 WITH begun AS (
     SELECT thread_id, process_id, start_event_id, end_event_id FROM staging.callback_run
@@ -39,6 +40,7 @@ origin AS (
 inside AS (
     SELECT
         o.start_event_id,
+        o.event_id AS step_event_id,
         b.start_event_id AS call_event_id
     FROM origin AS o
     ASOF JOIN begun AS b ON o.thread_id = b.thread_id AND o.event_id > b.start_event_id
@@ -50,22 +52,25 @@ taken AS (
     SELECT event_id, thread_id, is_request FROM staging.client_event WHERE NOT is_request
 ),
 behind AS (
-    SELECT o.start_event_id, t.event_id, t.is_request
+    SELECT
+        o.start_event_id,
+        o.event_id AS step_event_id,
+        t.event_id, t.is_request
     FROM origin AS o
     ANTI JOIN inside AS i ON o.start_event_id = i.start_event_id
     ASOF JOIN taken AS t ON o.thread_id = t.thread_id AND o.event_id > t.event_id
     WHERE coalesce(t.event_id > o.turn_event_id, true)
 )
 SELECT
-    start_event_id, call_event_id,
+    start_event_id, step_event_id, call_event_id,
     NULL::BIGINT AS response_event_id,
     NULL::BIGINT AS request_event_id
 FROM inside
 UNION ALL
-SELECT start_event_id, NULL, event_id, NULL FROM behind WHERE NOT is_request
+SELECT start_event_id, step_event_id, NULL, event_id, NULL FROM behind WHERE NOT is_request
 UNION ALL
 SELECT
-    start_event_id,
+    start_event_id, step_event_id,
     CASE WHEN start_event_id > min(start_event_id) OVER same THEN min(start_event_id) OVER same END,
     NULL,
     CASE WHEN start_event_id = min(start_event_id) OVER same THEN event_id END
@@ -150,7 +155,8 @@ SELECT
     t.start_event_id AS take_event_id,
     coalesce(r.subscription_event_id, t.subscription_event_id) AS subscription_event_id,
     coalesce(q.event_id, p.request_event_id) AS request_event_id,
-    p.call_event_id, p.response_event_id
+    coalesce(e.call_event_id, p.call_event_id) AS call_event_id,
+    p.response_event_id, p.step_event_id
 FROM run AS r
 LEFT JOIN staging.take_chain AS t
     ON r.called_by_event_id = t.end_event_id
@@ -163,3 +169,5 @@ LEFT JOIN (SELECT * FROM staging.service_event WHERE is_request) AS q
     AND NOT r.is_intra_process
     AND coalesce(r.service_event_id = q.service_event_id, true)
 LEFT JOIN callback_step AS p ON r.start_event_id = p.start_event_id
+-- A later step may start a job: that goes on for the first.
+LEFT JOIN callback_step AS e ON p.call_event_id = e.start_event_id

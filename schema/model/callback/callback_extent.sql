@@ -9,7 +9,7 @@ SELECT
     coalesce(r.end_ns, d.end_ns) AS end_ns,
     n.take_id, q.request_id, s.response_id,
     s.callback_instance_id AS continues_id,
-    r.is_intra_process, p.parent_id, r.depth, r.start_event_id, r.end_event_id,
+    s.step_event_id, r.is_intra_process, p.parent_id, r.depth, r.start_event_id, r.end_event_id,
     r.effective_end_event_id,
     g.start_event_id IS NOT NULL AS is_loss_affected
 FROM staging.callback_run AS r
@@ -26,7 +26,7 @@ LEFT JOIN (SELECT * FROM staging.loss_affected WHERE kind = 'callback') AS g
     ON r.start_event_id = g.start_event_id
 LEFT JOIN staging.request AS q ON r.start_event_id = q.callback_start_event_id
 LEFT JOIN (
-    SELECT b.start_event_id, f.callback_instance_id, y.response_id
+    SELECT b.start_event_id, b.step_event_id, f.callback_instance_id, y.response_id
     FROM staging.callback_binding AS b
     LEFT JOIN staging.callback_number AS f ON b.call_event_id = f.start_event_id
     LEFT JOIN staging.response AS y ON b.response_event_id = y.take_event_id
