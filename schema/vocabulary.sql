@@ -34,12 +34,16 @@
 -- param: max_depth BIGINT {1..} = 32  Longest path, in topics
 -- param: max_paths BIGINT {1..} = 1000  Most paths, the shortest first, and most chains of a length
 -- param: most_flows INTEGER = NULL  How many flows, the slowest first; NULL: all
+-- param: outcomes VARCHAR  Name of a table with the rows of main.end_to_end
 -- param: path BIGINT  Number of the path
 -- param: path_ids BIGINT[] = NULL  Only these paths; NULL: all
 -- param: run_a BIGINT  Run A, that run B is compared with
 -- param: run_b BIGINT  Run B
 -- param: runs BIGINT[]  Runs to look at
 -- param: seed BIGINT = 0  Random seed
+-- param: series VARCHAR  Name of a table with the rows of main.series
+-- param: series_values VARCHAR  Name of a table with the rows of main.series_value
+-- param: settled VARCHAR  Name of a table with the rows of main.settled, of one run
 -- param: sink_take_id BIGINT = NULL  Only flows that end with this take
 -- param: skip_first DOUBLE = 0.0  Skip the first seconds of each run
 -- param: start_id BIGINT  Identity of the vertex to start from
@@ -61,6 +65,7 @@
 -- param: window_end_ns BIGINT = NULL  End of the time window of roots, epoch ns, exclusive; NULL:
 --     any
 -- param: window_start_ns BIGINT = NULL  Start of the time window of roots, epoch ns; NULL: any
+-- param: windows VARCHAR  Name of a table with the rows of main.series_window
 -- param: without VARCHAR = NULL  Only flows through none of these
 -- column: a_count BIGINT  Values of run A
 -- column: action_name VARCHAR  Name of the action
@@ -69,10 +74,12 @@
 --     excludes the waiting one) or 'undecided' (nothing shows when the message arrived); in a cache
 --     'timer' (not due yet), 'unpublished' (the message that was waited for), or a part of that
 --     message's own flow
+-- column: after DOUBLE  Median of the windows behind, likewise
 -- column: alike_id BIGINT  The first path of the run with the same nodes and topics
 -- column: ambiguous BIGINT  Links with more than one candidate
 -- column: at_ns BIGINT [epoch ns]  Start of the publication, or the take
 -- column: b_count BIGINT  Values of run B
+-- column: before DOUBLE  Median of the windows before, in ns; of 'loss' a share
 -- column: blocked_max_ns BIGINT [ns]  Part of busy_max_ns for which a thread was free, but a
 --     callback ran that never runs beside this one
 -- column: busy BIGINT [ns]  Sum of their lengths
@@ -146,6 +153,7 @@
 -- column: node_id BIGINT  Node it belongs to
 -- column: nodes VARCHAR  First two nodes of its process, and how many more; without nodes its name
 --     and id
+-- column: number BIGINT  Place among the windows of the series that have values, from 1
 -- column: origin_ns BIGINT [epoch ns]  Moment from which it can have been due
 -- column: p95_ns BIGINT [ns]  95 % of them are at most this
 -- column: p99_ns BIGINT [ns]  99 % of them are at most this
@@ -187,7 +195,9 @@
 -- column: running_p99_ns BIGINT [ns]  99 % of the CPU times are at most this
 -- column: runs BIGINT  Runs that have it
 -- column: samples BIGINT  Samples in which it ran, or what it called
+-- column: score DOUBLE  By how many standard deviations they differ
 -- column: self_samples BIGINT  Samples in which it ran
+-- column: series_id BIGINT  The first object of those that are one, or the path of a 'latency'
 -- column: server VARCHAR  Node that offers it, or process in brackets; NULL: not in the trace
 -- column: shortest_message_ns BIGINT [ns]  Shortest delay of a message, after correction
 -- column: shortest_packet_ns BIGINT [ns]  Shortest delay of a packet, after correction

@@ -128,7 +128,13 @@ class _Questions:
         parts = self.ask("path-breakdown", times, to=self.place)
         # What is lost while a system warms up is lost.
         losses = self.ask("topics-delivery", asked)
-        tables = {"path_row": paths.table, "breakdown": parts.table, "delivery": losses.table}
+        changes = self.ask("changes", times, to=self.place)
+        tables = {
+            "path_row": paths.table,
+            "breakdown": parts.table,
+            "delivery": losses.table,
+            "change": changes.table,
+        }
         with registered(self.connection, **tables):
             for kind in culprit_sql().names():
                 self.keep(culprit_sql().header(kind).reads, values)

@@ -1,7 +1,7 @@
 -- description: Callbacks that run long on a path, or behind which others wait. How long: as long as
 --     those that are to blame for half of the time above the usual.
 -- grain: one row per node and callback
--- reads: callback_cpu, callback_use, harm, held_message, new_reader, noticed, thread_load
+-- reads: callback_change, callback_cpu, callback_use, harm, held_message, noticed, thread_load
 -- kind: inline
 WITH judged AS (
     SELECT
@@ -41,12 +41,12 @@ SELECT
     c.run_ns AS measured_ns,
     c.running_ns, c.waiting_ns, c.sleeping_ns, c.disk_ns,
     m.node IS NOT NULL AS is_held,
-    r.reader, r.reader_topic, r.since_ns, r.before_ns
+    g.is_trend, g.since_ns, g.before_ns, g.after_ns, g.occasion
 FROM named AS h
 LEFT JOIN callback_cpu AS c ON h.node = c.node AND h.callback = c.callback
 LEFT JOIN held_message AS m
     ON h.node = m.node AND h.callback = m.callback
     AND h.waiting_node = m.waiting_node AND h.topic_name = m.topic_name
-LEFT JOIN new_reader AS r ON h.node = r.node AND h.callback = r.callback
+LEFT JOIN callback_change AS g ON h.node = g.node AND h.callback = g.callback
 -- What a coroutine awaits on the path is no time that it takes.
 WHERE h.takes_ns >= h.limit_ns

@@ -2,7 +2,7 @@
 --     rows of main.end_to_end that are kept in a table. A flow with a stored message has no
 --     latency: it is among them only if its take is asked for.
 -- grain: one row per flow that reached the sink
--- param: outcomes VARCHAR  Name of a table with the rows of main.end_to_end
+-- param: outcomes
 -- param: flow_case, sink_take_id, most_flows, at_quantile, path_ids
 -- column: flow_id, run_id
 -- column: path_id BIGINT  Path, as in these rows

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from msgflow_sim.objects import IntraBuffer, SubscriptionObject, TimerObject, UserCode
     from msgflow_sim.transport import Middleware
 
+_NEVER = 1 << 62
+
 
 def run_timer(thread: Thread, middleware: Middleware, timer: TimerObject, time: int) -> Run:
     """Call a timer on a thread that has a CPU; returns the time of callback_end."""
@@ -24,6 +26,9 @@ def run_timer(thread: Thread, middleware: Middleware, timer: TimerObject, time: 
         timer.due += (1 + (time - timer.due - 1) // timer.period) * timer.period
     if timer.reset is not None and timer.due >= timer.reset:
         timer.due, timer.reset = timer.reset + timer.period, None
+    if timer.periods and timer.due >= timer.periods[0][0]:
+        since, timer.period = timer.periods.pop(0)
+        timer.due = since + timer.period if timer.period else _NEVER
     start = time + 500 + int(thread.scheduler.random() * 2_500)
     if timer.code.is_agnocast:
         agnocast.make_timer_callable(thread, timer, start - 400)

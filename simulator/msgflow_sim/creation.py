@@ -465,7 +465,17 @@ class Creator:
         code = self._code(node, description, executor)
         name = node.description.full_name
         executor.timers.append(
-            TimerObject(name, handle, callback, period, code, group, due, description.reset_ns)
+            TimerObject(
+                name,
+                handle,
+                callback,
+                period,
+                code,
+                group,
+                due,
+                description.reset_ns,
+                list(description.periods),
+            )
         )
 
     def links(self, node: NodeContext, created: Mapping[str, NodeContext]) -> None:

@@ -24,6 +24,8 @@ class Work:
         slow_probability: share of the runs (0..1) that take up to `slow_ns` longer.
         slow_ns: greatest additional duration of a slow run; it is at least half of that.
         percent_before: how much is done before the first publication, the rest after the last.
+        paces: from these times on, after the begin of tracing, all of it takes so many times as
+            long, until the next of them.
         sleep_ns: how long the thread sleeps before the first publication. This and all below
             happens only where the kernel is traced.
         page_fault_ns: how long it then waits for a page from the disk.
@@ -38,6 +40,7 @@ class Work:
     slow_probability: float = 0.0
     slow_ns: int = 0
     percent_before: int = 80
+    paces: tuple[tuple[int, float], ...] = field(default=(), repr=False)
     sleep_ns: int = field(default=0, repr=False)
     page_fault_ns: int = field(default=0, repr=False)
     mutex: str = field(default="", repr=False)
@@ -169,6 +172,7 @@ class Subscription:
         intra_process: see `Publisher`.
         transient_local: messages from before its creation are wanted, where publishers keep them.
         loss: share of the messages (0..1) that get lost on their way (best effort).
+        loss_from_ns: it begins then, after the begin of tracing.
         discovery_ns: how much longer than usual its discovery takes.
         polled: no executor takes its messages, but `Poll` does.
         created_ns: when a thread of the user creates it, after the begin of tracing; None: with
@@ -191,6 +195,7 @@ class Subscription:
     intra_process: bool = False
     transient_local: bool = False
     loss: float = 0.0
+    loss_from_ns: int = field(default=0, repr=False)
     discovery_ns: int = 0
     polled: bool = False
     created_ns: int | None = None
@@ -245,6 +250,8 @@ class Timer:
     Attributes:
         reset_ns: when user code resets it, after the begin of tracing: periods count from then on.
         rate: how fast its clock runs, as a multiple of that of the host (simulated time).
+        periods: user code gives it another period at these times, after the begin of tracing; with
+            a period of 0 it cancels the timer.
     """
 
     period_ns: int
@@ -255,6 +262,7 @@ class Timer:
     group: str = ""
     reset_ns: int | None = None
     rate: float = 1.0
+    periods: tuple[tuple[int, int], ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         if self.period_ns <= 0:

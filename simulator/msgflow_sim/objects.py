@@ -326,7 +326,8 @@ class UserCode:
 class TimerObject:
     """A timer as it exists in its process.
 
-    `due` is when it has to be called next, `reset` when user code will reset it.
+    `due` is when it has to be called next, `reset` when user code will reset it, `periods` the
+    periods that it will give it.
     """
 
     node: str
@@ -337,6 +338,7 @@ class TimerObject:
     group: CallbackGroup
     due: int
     reset: int | None = None
+    periods: list[tuple[int, int]] = field(default_factory=list)
 
     def is_ready(self, time: int) -> bool:
         """Whether it has to be called."""

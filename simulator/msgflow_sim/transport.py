@@ -121,7 +121,8 @@ class Middleware:
                 # Discovered while it was written to the channels of others.
                 self.drop(message, match.subscription, "before_discovery")
                 continue
-            if match.loss and scheduler.random() < match.loss:
+            loss = match.loss if time >= match.subscription.description.loss_from_ns else 0
+            if loss and scheduler.random() < loss:
                 self.drop(message, match.subscription, "lost_in_transport")
                 continue
             self._deliver(time, message, match)

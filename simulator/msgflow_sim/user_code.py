@@ -87,7 +87,7 @@ def _fill_and_publish(
     fired = links.fill(instance, is_late=False)
     work = code.work
     if links.gates(is_late=True):
-        time = yield thread.hold(time + _duration(thread, work))
+        time = yield thread.hold(time + _duration(thread, work, start))
         fired |= links.fill(instance, is_late=True)
         work = _KEEPING
     published: Counter[str] = Counter()
@@ -119,7 +119,7 @@ def _execute(
     cause: Callable[[str, int], CallbackInstance] | None = None,
 ) -> Run:
     work = code.work
-    duration = _duration(thread, work)
+    duration = _duration(thread, work, start)
     before = duration * work.percent_before // 100
     rest = 200 + duration * (100 - work.percent_before) // 100
     if code.is_stepwise or thread.machine.kernel is not None:
@@ -132,12 +132,13 @@ def _execute(
     return time + rest
 
 
-def _duration(thread: Thread, work: Work) -> int:
+def _duration(thread: Thread, work: Work, start: int) -> int:
     random = thread.scheduler.random
     duration = work.typical_ns + int(random() * work.spread_ns)
     if work.slow_probability and random() < work.slow_probability:
         duration += int((1 + random()) * work.slow_ns / 2)
-    return duration
+    paces = [pace for since, pace in work.paces if since <= start]
+    return int(duration * paces[-1]) if paces else duration
 
 
 def _step(

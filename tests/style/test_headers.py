@@ -43,6 +43,11 @@ TABLES = {
     "intervals": "(SELECT callback_instance_id AS interval_id, thread_id, start_ns AS from_ns,"
     " end_ns AS to_ns FROM main.callback_instance)",
     "parts": "main.end_to_end_part([1])",
+    "series": "main.series([1])",
+    "settled": "main.settled([1], NULL, NULL)",
+    "series_values": "main.series_value([1], 'series', 'outcomes')",
+    "windows": "main.series_window('series_values', 'settled')",
+    "steps": "main.value_step('windows')",
     "of_samples": "(SELECT 1::BIGINT AS group_id, stack_id, cpu_ns FROM main.stack_sample)",
     "waited": "main.executor_wait_explained([1])",
     "vertices": "(SELECT 8::BIGINT AS key, 'take' AS kind, 1::BIGINT AS id, 0 AS depth)",

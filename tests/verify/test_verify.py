@@ -48,6 +48,24 @@ targets:
     round_trip: p99 < 448301 ns
     completeness: ">= 100 %"
 """
+# A thread that publishes outside of callbacks.
+LOOP = """
+INSERT INTO store.thread BY NAME
+SELECT 1 AS run_id, 1 AS process_id, 9 AS thread_id, 9 AS tid;
+INSERT INTO store.publisher BY NAME
+SELECT 1 AS run_id, 1 AS process_id, 1 AS node_id, 9 AS publisher_id, '/command' AS topic_name;
+INSERT INTO store.publication BY NAME
+SELECT
+    1 AS run_id,
+    1 AS trace_id,
+    1 AS process_id,
+    9 AS thread_id,
+    9 AS publisher_id,
+    9000 + n AS publication_id,
+    20000000 * n AS start_ns,
+    20000000 * n AS end_ns
+FROM range(11) AS r (n);
+"""
 EXPECTED = {
     ("/a → /b", "latency", "median < 609741 ns"): ("passed", 609_740),
     ("/a → /b", "latency", "p99 < 928.11 us"): ("failed", 928_110),
@@ -193,10 +211,11 @@ def test_every_metric_reads_columns_that_its_query_has(
             "INSERT INTO store.thread_state BY NAME SELECT run_id, thread_id, 100 AS start_ns, "
             "130 AS end_ns, 'runnable' AS state, false AS is_loss_affected FROM store.thread"
         )
+        connection.execute(LOOP)
     units = {"ns": "1 ns", "Hz": "1 Hz", "share": "1 %", "count": "1"}
     names = {"path": "[/a, /b]", "timer": "/source", "callback": "Sub*", "topic": "/a"}
     names |= {"service": "/add", "action": "/dock", "process": "process"}
-    names |= {"from": "/a\n    to: /b"}
+    names |= {"from": "/a\n    to: /b", "loop": "/source"}
     for kind, subject in SUBJECTS.items():
         text, required = f"targets:\n  - {kind}: {names[kind]}\n", set()
         for name, metric in subject.metrics.items():

@@ -46,7 +46,9 @@ chosen AS (
             WHEN run_ns > usual_ns AND count < 20 THEN printf(' (longest of %d)', count)
             WHEN run_ns > usual_ns THEN ' (p95)'
             ELSE ''
-        END AS at_times,
+        END
+        || CASE WHEN NOT is_trend THEN printf(' since %.3g s', since_ns / 1e9) ELSE '' END
+        AS at_times,
         coalesce(topic_name, '?') AS topic
     FROM numbered AS c
     WHERE NOT EXISTS (
@@ -141,6 +143,19 @@ said AS (
                 'keeps data for %s for %s (p95), until further messages on its inputs come', topic,
                 main.duration_text(p95_ns)
             )
+            WHEN 'stopped' THEN coalesce(
+                printf(
+                    '%s stopped at %.3g s, %d calls are missing', callback, since_ns / 1e9, lost
+                ),
+                printf(
+                    'publishes nothing on %s since %.3g s, %d messages are missing', topic,
+                    since_ns / 1e9, lost
+                )
+            )
+            WHEN 'paused' THEN printf(
+                '%s pauses %d times, for up to %s, while %s of %s runs', topic, count, run,
+                other_callback, other
+            )
             WHEN 'restart' THEN printf('ended, and ran again after %s', run)
             || coalesce(
                 printf(': %d of %d messages on %s were lost', lost, published, topic_name), ''
@@ -195,10 +210,18 @@ said AS (
                                     WHEN 'softirq' THEN 'the network or a device'
                                 END
                             ),
-                            printf(
-                                'it took %s before %s got messages on %s, from %.3g s on',
-                                main.duration_text(before_ns), reader, reader_topic, since_ns / 1e9
-                            ),
+                            CASE WHEN is_trend THEN printf(
+                                'it grows from %s to %s during the run',
+                                main.duration_text(before_ns), main.duration_text(after_ns)
+                            ) ELSE printf(
+                                'before, it took %s%s', main.duration_text(before_ns),
+                                coalesce('; ' || occasion || ' then', '')
+                            ) END,
+                            CASE WHEN kind = 'stopped' THEN coalesce(
+                                occasion,
+                                CASE WHEN callback IS NOT NULL
+                                    THEN 'cancelled, or no executor looks at it: not known' END
+                            ) END,
                             CASE WHEN kind = 'callback' THEN printf(
                                 'on a CPU for %.0f %% of it, ready without one for %.0f %%',
                                 100 * running_ns / measured_ns, 100 * waiting_ns / measured_ns
@@ -222,7 +245,7 @@ said AS (
                                 )
                             END,
                             CASE WHEN lost > 0 AND kind NOT IN (
-                                'restart', 'never_matched', 'late_start', 'lost'
+                                'restart', 'never_matched', 'late_start', 'lost', 'stopped'
                             ) THEN printf(
                                 '%d of %d messages on %s were overwritten', lost, published, topic
                             ) END,

@@ -1,0 +1,246 @@
+-- title: What changed during a run, and when
+-- description: Latency of paths, durations and CPU times of callbacks, periods of timers and
+--     topics, waits and losses of messages: steps from one level to another, trends, pauses, and
+--     what stops or begins. Each with what else changed or began within the same second. The time
+--     until the nodes have started is left out, and so are the windows at both ends: 1 of 16 of the
+--     run.
+-- grain: one row per change
+-- reads: path_outcome, named_path
+-- param: from, to, from_event, to_event, max_depth, max_paths
+-- column: run_id
+-- column: at_ns BIGINT [epoch ns]  When; of a trend its begin
+-- column: kind VARCHAR              'step', 'trend', 'stop' (silent until the end), 'begin' (silent
+--     before) or 'gap' (silent for much longer than usual, the first of several)
+-- column: what VARCHAR              What changed: 'latency' of a path, 'duration' or 'CPU time' of
+--     a callback, the period of a 'timer' or 'topic', 'wait' of messages, or their 'loss'
+-- column: node VARCHAR [node]       Node; empty: several, on a path
+-- column: subject VARCHAR           The path, callback or topic
+-- column: before DOUBLE             Median before, and the period of what stops: [ns], of 'loss' a
+--     share
+-- column: after DOUBLE              Median after; of 'stop', 'begin' and 'gap' the longest silence
+-- column: change VARCHAR            Both, as people say it
+-- column: count BIGINT              Pauses, or messages and calls that are missing in the silence
+-- column: certainty DOUBLE [share]  Windows on their side of the middle between before and after;
+--     of a trend, by how much more pairs of windows go its way than the other
+-- column: low DOUBLE                Trends: with 90 %, the slope is at least so much, per second
+-- column: high DOUBLE               Trends: and at most so much
+-- column: follows VARCHAR           The change that explains this one; empty: none does
+-- column: meanwhile_node VARCHAR [node]  Node of the callback that ran for half of the time of the
+--     pauses, or more
+-- column: meanwhile_callback VARCHAR  What triggers it
+-- column: meanwhile_share DOUBLE [share]  For so much of their time
+-- column: since VARCHAR             What began or happened within the same second, and fits best
+-- column: others VARCHAR[]          What else did, the nearest in time first
+-- brief: at_ns, kind, what, node, subject, change, since, follows, count,
+--     meanwhile_callback, meanwhile_node, certainty
+-- note: callbacks
+CREATE OR REPLACE TEMP TABLE series AS
+FROM main.series($runs);
+
+CREATE OR REPLACE TEMP TABLE settled AS
+FROM main.settled($runs, $start_ns, $end_ns);
+
+CREATE OR REPLACE TEMP TABLE series_value AS
+FROM main.series_value($runs, 'series', 'path_outcome');
+
+CREATE OR REPLACE TEMP TABLE series_window AS
+FROM main.series_window('series_value', 'settled');
+
+CREATE OR REPLACE TEMP TABLE change_step AS
+FROM main.value_step('series_window');
+
+CREATE OR REPLACE TEMP TABLE change_found AS
+WITH trend AS (FROM main.value_trend('series_window'))
+SELECT
+    'trend' AS kind,
+    what, series_id, at_ns, before, after,
+    NULL::BIGINT AS count,
+    certainty,
+    slopes[1] * 1e9 AS low,
+    slopes[3] * 1e9 AS high,
+    NULL::BIGINT[][] AS times
+FROM trend
+UNION ALL
+SELECT 'step', s.what, s.series_id, s.at_ns, s.before, s.after, NULL, NULL, NULL, NULL, NULL
+FROM main.value_step_exact('change_step', 'series_value', 'settled') AS s
+WHERE NOT EXISTS (FROM trend AS t WHERE t.what = s.what AND t.series_id = s.series_id)
+UNION ALL
+SELECT kind, what, series_id, at_ns, usual, longest_ns, count, NULL, NULL, NULL, times
+FROM main.value_pause($runs, 'series_value', 'settled');
+
+CREATE OR REPLACE TEMP TABLE change_named AS
+WITH node_topic AS (
+    SELECT
+        node,
+        list_distinct(list(topic_name) FILTER (owner = 'subscription')) AS takes,
+        list_distinct(list(topic_name) FILTER (owner = 'publisher')) AS gives
+    FROM series
+    GROUP BY node
+)
+SELECT
+    row_number() OVER (ORDER BY c.at_ns, c.what, c.series_id) AS change_id,
+    c.*,
+    coalesce(s.run_id, p.run_id) AS run_id,
+    s.node,
+    coalesce(s.subject, p.path) AS subject,
+    s.process_id, o.host_id, s.topic_name,
+    CASE WHEN c.what = 'latency' THEN string_split(p.path, ' → ') ELSE [s.node] END AS nodes,
+    CASE
+        WHEN c.what = 'latency' THEN p.topics
+        WHEN c.what = 'topic' THEN n.takes
+        WHEN s.topic_name IS NULL THEN []
+        ELSE [s.topic_name]
+    END AS takes,
+    CASE WHEN c.what IN ('duration', 'CPU time', 'timer', 'topic') THEN n.gives ELSE [] END AS gives
+FROM change_found AS c
+LEFT JOIN (FROM series WHERE object_id = series_id) AS s
+    ON c.what <> 'latency'
+    AND c.series_id = s.series_id
+    AND s.owner = CASE
+        WHEN c.what IN ('duration', 'CPU time', 'timer') THEN 'callback'
+        WHEN c.what = 'topic' THEN 'publisher'
+        ELSE 'subscription'
+    END
+LEFT JOIN named_path AS p ON c.what = 'latency' AND c.series_id = p.path_id
+LEFT JOIN main.process AS o ON s.process_id = o.process_id
+LEFT JOIN node_topic AS n ON s.node = n.node;
+
+-- A change that explains another one: it comes with it, or before it in the chain.
+CREATE OR REPLACE TEMP TABLE change_cause AS
+SELECT
+    c.change_id,
+    arg_min(
+        x.change_id,
+        (
+            CASE
+                WHEN x.what = 'duration' THEN 0
+                WHEN x.what = 'timer' THEN 1
+                WHEN x.what = 'topic' THEN 2
+                ELSE 3
+            END,
+            abs(x.at_ns - c.at_ns)
+        )
+    ) AS cause_id
+FROM change_named AS c
+JOIN change_named AS x
+    ON c.change_id <> x.change_id
+    AND (c.kind = 'trend') = (x.kind = 'trend')
+    AND (
+        c.kind = 'trend'
+        -- A queue needs time to grow, and losses are noticed now and then.
+        OR x.at_ns BETWEEN
+            c.at_ns - CASE
+                WHEN x.what = 'loss' THEN c.at_ns
+                WHEN c.what IN ('wait', 'latency', 'loss') THEN 3_000_000_000
+                ELSE 1_000_000_000
+            END
+            AND c.at_ns + 1_000_000_000
+    )
+    AND CASE c.what
+        WHEN 'latency' THEN
+            x.what IN ('duration', 'wait', 'timer', 'topic') AND list_contains(c.nodes, x.node)
+        WHEN 'CPU time' THEN x.what = 'duration' AND x.series_id = c.series_id
+        WHEN 'wait' THEN
+            (x.what = 'duration' AND x.process_id = c.process_id)
+            OR (x.what = 'duration' AND list_contains(x.gives, c.topic_name))
+            OR (x.what = 'topic' AND x.topic_name = c.topic_name)
+        WHEN 'loss' THEN
+            (x.what = 'duration' AND x.process_id = c.process_id)
+            OR (x.what = 'topic' AND x.topic_name = c.topic_name)
+        WHEN 'topic' THEN
+            (x.what IN ('duration', 'timer') AND x.node = c.node)
+            OR (x.what IN ('topic', 'loss') AND list_contains(c.takes, x.topic_name))
+        WHEN 'timer' THEN x.what = 'duration' AND x.process_id = c.process_id
+    END
+GROUP BY c.change_id;
+
+-- Which callback of the process ran for half of the time of the pauses, or more.
+CREATE OR REPLACE TEMP TABLE change_beside AS
+WITH pause AS (
+    SELECT
+        change_id, process_id,
+        unnest(times) AS ends
+    FROM change_named
+    WHERE kind = 'gap'
+),
+total AS (
+    SELECT
+        change_id,
+        sum(ends[2] - ends[1]) AS pause_ns
+    FROM pause
+    GROUP BY change_id
+)
+SELECT
+    p.change_id, s.node, s.subject,
+    sum(least(i.end_ns, p.ends[2]) - greatest(i.start_ns, p.ends[1])) / any_value(t.pause_ns)
+        AS share
+FROM pause AS p
+JOIN total AS t ON p.change_id = t.change_id
+JOIN main.callback_instance AS i
+    ON p.process_id = i.process_id AND i.start_ns < p.ends[2] AND i.end_ns > p.ends[1]
+JOIN series AS s ON s.owner = 'callback' AND i.callback_id = s.object_id
+GROUP BY p.change_id, s.node, s.subject
+HAVING share >= 0.5
+QUALIFY row_number() OVER (PARTITION BY p.change_id ORDER BY share DESC, s.node, s.subject) = 1;
+
+CREATE OR REPLACE TEMP TABLE change_occasion AS
+SELECT
+    c.change_id, o.sentence,
+    abs(o.at_ns - c.at_ns) AS apart_ns,
+    CASE
+        WHEN list_has_any(o.nodes, c.nodes) THEN 1
+        WHEN list_has_any(o.topics, list_concat(c.takes, c.gives)) THEN 2
+        WHEN len(o.nodes) = 0 AND (o.host_id IS NULL OR o.host_id = c.host_id) THEN 3
+        ELSE 4
+    END AS place
+FROM change_named AS c
+JOIN main.occasion($runs, 'series') AS o
+    ON o.at_ns BETWEEN c.at_ns - 1_000_000_000 AND c.at_ns + 1_000_000_000
+WHERE c.kind <> 'trend';
+
+WITH best AS (
+    SELECT
+        change_id,
+        arg_min(sentence, (place, apart_ns)) FILTER (place <= 3) AS since,
+        list(sentence ORDER BY apart_ns, sentence) AS sentences
+    FROM change_occasion
+    GROUP BY change_id
+),
+side AS (
+    SELECT
+        c.change_id,
+        avg(
+            (
+                (w.value > (c.before + c.after) / 2)
+                = ((w.at_ns >= c.at_ns) = (c.after > c.before))
+            )::INTEGER
+        ) AS share
+    FROM change_named AS c
+    JOIN series_window AS w ON c.what = w.what AND c.series_id = w.series_id
+    CROSS JOIN settled AS s
+    WHERE c.kind = 'step' AND abs(w.at_ns - c.at_ns) < (s.end_ns - s.start_ns) // 8
+    GROUP BY c.change_id
+)
+SELECT
+    c.run_id, c.at_ns, c.kind, c.what, c.node, c.subject, c.before, c.after,
+    CASE
+        WHEN c.what = 'loss' THEN printf('%.0f → %.0f %%', 100 * c.before, 100 * c.after)
+        ELSE main.duration_text(c.before::BIGINT) || ' → ' || main.duration_text(c.after::BIGINT)
+    END AS change,
+    c.count,
+    coalesce(c.certainty, s.share) AS certainty,
+    c.low, c.high,
+    x.what || ' ' || x.subject || coalesce(' of ' || x.node, '') AS follows,
+    d.node AS meanwhile_node,
+    d.subject AS meanwhile_callback,
+    d.share AS meanwhile_share,
+    b.since,
+    list_filter(b.sentences, lambda each: each IS DISTINCT FROM b.since) AS others
+FROM change_named AS c
+LEFT JOIN change_cause AS f ON c.change_id = f.change_id
+LEFT JOIN change_named AS x ON f.cause_id = x.change_id
+LEFT JOIN best AS b ON c.change_id = b.change_id
+LEFT JOIN change_beside AS d ON c.change_id = d.change_id
+LEFT JOIN side AS s ON c.change_id = s.change_id
+WHERE c.what = 'loss' OR coalesce(s.share, 1) > 0.85
+ORDER BY c.run_id, x.change_id IS NOT NULL, c.at_ns, c.what, c.node, c.subject

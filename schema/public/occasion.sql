@@ -1,0 +1,185 @@
+-- description: What began, ended, or happened once, besides what is measured: nodes, their objects,
+--     transitions, parameters, goals, rare requests, programs, lost events.
+-- grain: one row per occasion
+-- param: runs, series
+-- column: at_ns BIGINT [epoch ns]  When it happened
+-- column: nodes VARCHAR[]  Nodes that it is of
+-- column: topics VARCHAR[]  Topics that it is about
+-- column: host_id BIGINT  Machine that it happened on; NULL: any
+-- column: sentence VARCHAR  What happened
+CREATE OR REPLACE MACRO main.occasion(runs, series) AS TABLE
+WITH life AS (
+    SELECT
+        n.full_name AS node,
+        n.created_ns, p.host_id, p.process_id, p.last_seen_ns, r.start_ns, r.end_ns,
+        list_distinct(list(s.topic_name) FILTER (s.topic_name IS NOT NULL)) AS topics,
+        list_distinct(list(s.topic_name) FILTER (s.owner = 'subscription')) AS takes
+    FROM main.node AS n
+    JOIN main.process AS p ON n.process_id = p.process_id
+    JOIN main.run AS r ON n.run_id = r.run_id
+    LEFT JOIN query_table(series) AS s ON n.process_id = s.process_id AND n.full_name = s.node
+    WHERE list_contains(runs, n.run_id)
+    GROUP BY ALL
+),
+-- The last message on each topic.
+heard AS (
+    SELECT
+        s.topic_name,
+        max(b.start_ns) AS last_ns
+    FROM main.publication AS b
+    JOIN query_table(series) AS s ON s.owner = 'publisher' AND b.publisher_id = s.object_id
+    GROUP BY s.topic_name
+),
+timed AS (
+    SELECT DISTINCT c.process_id
+    FROM main.callback AS c
+    JOIN main.callback_instance AS i ON c.callback_id = i.callback_id
+    WHERE list_contains(runs, c.run_id) AND c.kind = 'timer'
+),
+object AS (
+    SELECT
+        'Subscription' AS label,
+        node_id, topic_name, created_ns
+    FROM main.subscription
+    WHERE list_contains(runs, run_id) AND NOT is_internal
+    UNION ALL
+    SELECT 'Publisher', node_id, topic_name, created_ns
+    FROM main.publisher
+    WHERE list_contains(runs, run_id) AND NOT is_internal
+),
+program AS (
+    SELECT
+        host_id,
+        coalesce(left(regexp_replace(command, '(^| )[^ ]*/', '\1', 'g'), 40), name) AS program,
+        pid, start_ns,
+        cpu_ns / (end_ns - start_ns) AS cpus
+    FROM main.program_usage
+    WHERE list_contains(runs, run_id) AND process_id IS NULL AND NOT is_recorder
+),
+taken AS (
+    SELECT
+        o.host_id,
+        coalesce(o.program, '?') AS program,
+        p.start_ns, p.end_ns
+    FROM main.preemptor AS p
+    JOIN main.other_thread AS o ON p.preemptor_other_thread_id = o.other_thread_id
+    WHERE list_contains(runs, o.run_id) AND NOT coalesce(o.is_recorder, false)
+)
+SELECT
+    created_ns AS at_ns,
+    [node] AS nodes,
+    topics, host_id,
+    printf('%s began', node) AS sentence
+FROM life
+WHERE created_ns > start_ns + 1_000_000_000
+UNION ALL
+SELECT
+    last_seen_ns,
+    [node],
+    topics, host_id,
+    printf('%s is not seen any more', node)
+FROM life AS l
+WHERE l.last_seen_ns < l.end_ns - 1_000_000_000
+    -- One that gets no messages any more, and has no timer, may be well.
+    AND (
+        l.process_id IN (SELECT process_id FROM timed)
+        OR EXISTS (
+            FROM heard AS h
+            WHERE list_contains(l.takes, h.topic_name) AND h.last_ns > l.last_seen_ns + 100_000_000
+        )
+    )
+UNION ALL
+SELECT
+    o.created_ns,
+    [n.full_name],
+    [o.topic_name],
+    p.host_id,
+    printf('%s(%s) of %s began', o.label, o.topic_name, n.full_name)
+FROM object AS o
+JOIN main.node AS n ON o.node_id = n.node_id
+JOIN main.process AS p ON n.process_id = p.process_id
+WHERE o.created_ns > n.created_ns + 1_000_000_000
+UNION ALL
+SELECT
+    t.at_ns,
+    [n.full_name],
+    [],
+    p.host_id,
+    printf('%s became %s', n.full_name, t.goal_state)
+FROM main.lifecycle_transition AS t
+JOIN main.node AS n ON t.node_id = n.node_id
+JOIN main.process AS p ON n.process_id = p.process_id
+WHERE list_contains(runs, t.run_id)
+UNION ALL
+SELECT
+    b.start_ns,
+    [n.full_name],
+    [],
+    p.host_id,
+    printf('a parameter of %s was set', n.full_name)
+FROM main.publication AS b
+JOIN main.publisher AS u ON b.publisher_id = u.publisher_id
+JOIN main.node AS n ON u.node_id = n.node_id
+JOIN main.process AS p ON n.process_id = p.process_id
+WHERE list_contains(runs, b.run_id) AND u.topic_name = '/parameter_events'
+    AND b.start_ns > n.created_ns + 1_000_000_000
+UNION ALL
+SELECT
+    coalesce(g.sent_ns, g.taken_ns),
+    list_filter([m.full_name, n.full_name], lambda name: name IS NOT NULL),
+    [],
+    NULL,
+    printf('a goal of %s was sent', g.action_name)
+FROM main.goal AS g
+LEFT JOIN main.service AS v ON g.action_server_id = v.service_id
+LEFT JOIN main.node AS n ON v.node_id = n.node_id
+LEFT JOIN main.client AS c ON g.action_client_id = c.client_id
+LEFT JOIN main.node AS m ON c.node_id = m.node_id
+WHERE list_contains(runs, g.run_id)
+UNION ALL
+SELECT
+    coalesce(q.sent_ns, q.taken_ns),
+    list_filter([m.full_name, n.full_name], lambda name: name IS NOT NULL),
+    [],
+    NULL,
+    printf('%s was called', coalesce(v.service_name, c.service_name))
+FROM main.request AS q
+LEFT JOIN main.service AS v ON q.service_id = v.service_id
+LEFT JOIN main.node AS n ON v.node_id = n.node_id
+LEFT JOIN main.client AS c ON q.client_id = c.client_id
+LEFT JOIN main.node AS m ON c.node_id = m.node_id
+WHERE list_contains(runs, q.run_id)
+    AND NOT coalesce(v.is_internal, c.is_internal, false)
+    AND coalesce(v.service_name, c.service_name) NOT LIKE '%/_action/%'
+-- A service that is called all the time is no occasion.
+QUALIFY count(*) OVER (PARTITION BY coalesce(v.service_name, c.service_name)) <= 5
+UNION ALL
+SELECT
+    min(start_ns) FILTER (cpus > 0.2),
+    [],
+    [],
+    host_id,
+    printf('%s (pid %d) used %.1f CPUs', program, pid, max(cpus))
+FROM program
+GROUP BY host_id, program, pid
+HAVING max(cpus) > 0.2
+UNION ALL
+SELECT
+    min(start_ns),
+    [],
+    [],
+    host_id,
+    printf('%s took the CPU', program)
+FROM taken
+GROUP BY host_id, program
+HAVING sum(end_ns - start_ns) > 20_000_000
+UNION ALL
+SELECT
+    min(start_ns),
+    [],
+    [],
+    NULL,
+    printf('events were lost (%s)', kind)
+FROM main.gap
+WHERE list_contains(runs, run_id) AND kind = 'loss'
+GROUP BY kind, start_ns // 1_000_000_000

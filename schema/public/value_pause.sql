@@ -1,0 +1,73 @@
+-- description: Timers and topics that stop until the end of the run, that begin late, or that pause
+--     for much longer than they usually do. Pauses in which a trace has a gap are left out.
+-- grain: one row per series and kind
+-- param: runs, series_values, settled
+-- column: kind VARCHAR  'stop', 'begin' or 'gap'
+-- column: what VARCHAR  'timer' or 'topic'
+-- column: series_id
+-- column: at_ns BIGINT [epoch ns]  Begin of the first silence; of 'begin' the end of it
+-- column: usual DOUBLE  Median time from one to the next, in ns
+-- column: longest_ns BIGINT [ns]  Longest silence
+-- column: count BIGINT  Pauses; of 'stop' and 'begin' what is missing in the silence
+-- column: times BIGINT[][]  Begin and end of each, epoch ns
+CREATE OR REPLACE MACRO main.value_pause(runs, series_values, settled) AS TABLE
+WITH usual AS (
+    SELECT
+        v.what, v.series_id,
+        median(v.value) AS median_ns,
+        quantile_cont(v.value, 0.95) AS p95_ns,
+        max(v.value) AS longest_ns,
+        min(v.at_ns) AS first_ns,
+        max(v.at_ns) AS last_ns
+    FROM query_table(series_values) AS v
+    CROSS JOIN query_table(settled) AS s
+    WHERE v.what IN ('timer', 'topic') AND v.at_ns >= s.start_ns AND v.at_ns < s.end_ns
+    GROUP BY v.what, v.series_id
+    HAVING count(v.value) >= 10
+),
+gap AS (
+    SELECT start_ns, end_ns FROM main.gap WHERE list_contains(runs, run_id)
+),
+pause AS (
+    SELECT
+        v.what, v.series_id, u.median_ns,
+        'gap' AS kind,
+        v.at_ns - v.value::BIGINT AS from_ns,
+        v.at_ns AS to_ns
+    FROM query_table(series_values) AS v
+    CROSS JOIN query_table(settled) AS s
+    JOIN usual AS u ON v.what = u.what AND v.series_id = u.series_id
+    WHERE from_ns >= s.start_ns AND to_ns < s.end_ns
+        AND v.value > 2 * u.p95_ns AND v.value > u.median_ns + 50_000_000
+    UNION ALL
+    SELECT u.what, u.series_id, u.median_ns, 'stop', u.last_ns, s.end_ns
+    FROM usual AS u
+    CROSS JOIN query_table(settled) AS s
+    WHERE s.end_ns - u.last_ns > greatest(10 * u.p95_ns, 2 * u.longest_ns, 1_000_000_000)
+    UNION ALL
+    SELECT u.what, u.series_id, u.median_ns, 'begin', s.start_ns, u.first_ns
+    FROM usual AS u
+    CROSS JOIN query_table(settled) AS s
+    WHERE u.first_ns - s.start_ns > greatest(10 * u.p95_ns, 2 * u.longest_ns, 1_000_000_000)
+)
+SELECT
+    p.kind, p.what, p.series_id,
+    min(CASE WHEN p.kind = 'begin' THEN p.to_ns ELSE p.from_ns END) AS at_ns,
+    any_value(p.median_ns) AS usual,
+    max(p.to_ns - p.from_ns) AS longest_ns,
+    CASE WHEN p.kind = 'gap' THEN count(*) ELSE any_value((p.to_ns - p.from_ns) // p.median_ns) END
+        ::BIGINT AS count,
+    list([p.from_ns, p.to_ns] ORDER BY p.from_ns) AS times
+FROM pause AS p
+WHERE NOT EXISTS (
+    FROM gap AS g
+    WHERE g.start_ns < p.to_ns
+        AND g.end_ns > p.from_ns
+        AND (
+            p.kind = 'gap'
+            -- What is lost meanwhile does not hide all of a long silence.
+            OR 2 * (least(g.end_ns, p.to_ns) - greatest(g.start_ns, p.from_ns))
+                > p.to_ns - p.from_ns
+        )
+)
+GROUP BY p.kind, p.what, p.series_id

@@ -1,0 +1,178 @@
+"""The queries changes and loops on a simulated system in which several things change."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.ingested import ingest_one
+
+import msgflow
+from msgflow_sim import (
+    Host,
+    Node,
+    Process,
+    Publisher,
+    Recording,
+    Scenario,
+    Subscription,
+    Timer,
+    Work,
+    simulate,
+)
+from msgflow_sim.entity import MILLISECOND, SECOND
+
+SECONDS = 20
+# When what changes, in seconds.
+SLOWER, FASTER, CANCELLED, KILLED, LOSSY, SLOWER_TIMER = 7.3, 14.2, 6.1, 11.6, 9.4, 12.7
+
+
+def system(*, changes: bool) -> Scenario:
+    """Sensors with a reader each; of some readers or sensors something changes."""
+
+    def at(seconds: float) -> int:
+        return int((seconds if changes else 2 * SECONDS) * SECOND)
+
+    growing = tuple((at(0.1 * step), 1 + 0.02 * step) for step in range(10 * SECONDS))
+    readers = {
+        "slower": Work(5 * MILLISECOND, MILLISECOND, paces=((at(SLOWER), 2), (at(FASTER), 1))),
+        "growing": Work(4 * MILLISECOND, MILLISECOND, paces=growing),
+        "lossy": Work(MILLISECOND),
+        "steady": Work(3 * MILLISECOND, 9 * MILLISECOND),
+        "killed": Work(2 * MILLISECOND),
+        "cancelled": Work(2 * MILLISECOND),
+        "slower_timer": Work(2 * MILLISECOND),
+    }
+    periods = {
+        "cancelled": ((at(CANCELLED), 0),),
+        "slower_timer": ((at(SLOWER_TIMER), 60 * MILLISECOND),),
+    }
+    processes = []
+    for number, (name, work) in enumerate(readers.items()):
+        sensor = Node(
+            f"{name}_sensor",
+            publishers=(Publisher(f"/{name}"),),
+            timers=(Timer(40 * MILLISECOND, (f"/{name}",), Work(), periods=periods.get(name, ())),),
+        )
+        reader = Node(
+            name,
+            publishers=(Publisher(f"/{name}_result"),),
+            subscriptions=(
+                Subscription(
+                    f"/{name}",
+                    (f"/{name}_result",),
+                    work,
+                    loss=0.4 if name == "lossy" else 0,
+                    loss_from_ns=at(LOSSY),
+                ),
+            ),
+        )
+        pid = 1000 + 100 * number
+        processes += [
+            Process(f"{name}_sensor", "robot", pid, (sensor,)),
+            Process(
+                name,
+                "robot",
+                pid + 50,
+                (reader,),
+                stop_ns=at(KILLED) if name == "killed" and changes else None,
+                is_killed=name == "killed" and changes,
+            ),
+        ]
+    return Scenario(
+        name="changes",
+        description="Sensors with readers.",
+        hosts=(Host("robot", cpu_count=16),),
+        processes=tuple(processes),
+        duration_ns=SECONDS * SECOND,
+        layout="kilted",
+        overwrites=True,
+        recording=Recording(),
+    )
+
+
+@pytest.fixture(scope="module")
+def changed(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    """Rows of the query, with the time since the begin of the recording [s]."""
+    return asked(tmp_path_factory.mktemp("changed"), system(changes=True))
+
+
+def asked(folder: Path, scenario: Scenario) -> list[dict[str, Any]]:
+    simulate(scenario, folder / "trace")
+    database = folder / "run.duckdb"
+    ingest_one(folder / "trace", database)
+    with msgflow.open_db(database) as opened:
+        rows = opened.query("changes").table.to_pylist()
+        begin = opened.sql("SELECT min(start_ns) AS ns FROM run").table["ns"][0].as_py()
+    return [row | {"at": (row["at_ns"] - begin) / SECOND} for row in rows]
+
+
+def rows_of(
+    rows: list[dict[str, Any]], kind: str, what: str, node: str | None
+) -> list[dict[str, Any]]:
+    return [row for row in rows if (row["kind"], row["what"], row["node"]) == (kind, what, node)]
+
+
+def test_nothing_changes_where_nothing_does(tmp_path: Path) -> None:
+    assert asked(tmp_path, system(changes=False)) == []
+
+
+def test_a_callback_that_takes_longer_for_a_while_steps_up_and_down(
+    changed: list[dict[str, Any]],
+) -> None:
+    up, down = rows_of(changed, "step", "duration", "/slower")
+    assert up["at"] == pytest.approx(SLOWER, abs=0.1)
+    assert down["at"] == pytest.approx(FASTER, abs=0.1)
+    assert up["before"] == pytest.approx(5.5e6, rel=0.05)
+    assert up["after"] == pytest.approx(11e6, rel=0.05)
+    assert " ms → 1" in up["change"]
+    assert up["certainty"] > 0.95
+    assert not up["follows"]
+    # The path through it is later by as much, since it takes longer.
+    path, *_ = [row for row in changed if row["what"] == "latency" and "/slower " in row["subject"]]
+    assert path["follows"] == "duration Subscription(/slower) of /slower"
+
+
+def test_what_grows_all_the_time_is_a_trend_and_no_step(changed: list[dict[str, Any]]) -> None:
+    (trend,) = rows_of(changed, "trend", "duration", "/growing")
+    assert trend["after"] / trend["before"] == pytest.approx(4, rel=0.15)
+    # 0.02 of 4.5 ms each 0.1 s.
+    assert trend["low"] < 0.2 * 4.5e6 < trend["high"]
+    assert not rows_of(changed, "step", "duration", "/growing")
+
+
+def test_a_cancelled_timer_stops_and_its_topic_follows(changed: list[dict[str, Any]]) -> None:
+    (timer,) = rows_of(changed, "stop", "timer", "/cancelled_sensor")
+    assert timer["at"] == pytest.approx(CANCELLED, abs=0.05)
+    assert timer["count"] == pytest.approx((SECONDS - CANCELLED) / 0.04, abs=5)
+    assert not timer["follows"]
+    (topic,) = rows_of(changed, "stop", "topic", "/cancelled_sensor")
+    assert topic["follows"] == "timer Timer(40 ms) of /cancelled_sensor"
+    (result,) = rows_of(changed, "stop", "topic", "/cancelled")
+    assert result["follows"] == "topic /cancelled of /cancelled_sensor"
+
+
+def test_a_node_that_dies_is_named(changed: list[dict[str, Any]]) -> None:
+    (result,) = rows_of(changed, "stop", "topic", "/killed")
+    assert result["at"] == pytest.approx(KILLED, abs=0.1)
+    assert result["since"] == "/killed is not seen any more"
+    assert not result["follows"]
+    assert not rows_of(changed, "stop", "topic", "/killed_sensor")
+
+
+def test_losses_begin(changed: list[dict[str, Any]]) -> None:
+    (loss,) = rows_of(changed, "step", "loss", "/lossy")
+    assert loss["at"] == pytest.approx(LOSSY, abs=1)
+    assert loss["before"] == 0
+    assert loss["after"] == pytest.approx(0.4, abs=0.15)
+
+
+def test_a_timer_gets_another_period(changed: list[dict[str, Any]]) -> None:
+    (timer,) = rows_of(changed, "step", "timer", "/slower_timer_sensor")
+    assert timer["at"] == pytest.approx(SLOWER_TIMER, abs=0.1)
+    assert (timer["before"], timer["after"]) == pytest.approx((40e6, 60e6), rel=0.01)
+
+
+def test_what_does_not_change_has_no_row(changed: list[dict[str, Any]]) -> None:
+    assert not [row for row in changed if "/steady" in f"{row['node']} {row['subject']}"]
