@@ -1,6 +1,6 @@
 -- title: Callbacks that never end
--- description: With the request that is the last that their threads did, if it is. The execution of a
---     goal may take longer than the recording, and so may what runs for the first time, unless it
+-- description: With the request that is the last that their threads did, if it is. The execution of
+--     a goal may take longer than the recording, and so may what runs for the first time, unless it
 --     waits for an answer.
 -- grain: one row per thread
 -- reads: callback_name
