@@ -124,6 +124,7 @@ _OPTIONS = {
     "waits --by pair": " --limit 3",
 }
 _SETUPS = {
+    "changes": "msgflow simulate stall -o trace\nmsgflow ingest trace\n",
     "scheduling": "msgflow simulate cpu_hog -o trace\nmsgflow ingest trace\n",
     "links": (
         "msgflow simulate periodic_async -o declared\n"
