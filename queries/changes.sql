@@ -49,9 +49,27 @@ FROM main.series_window('series_value', 'settled');
 CREATE OR REPLACE TEMP TABLE change_step AS
 FROM main.value_step('series_window');
 
+-- How many of the windows around the moment are on their side. Of losses few are of any size.
+CREATE OR REPLACE TEMP TABLE clear_step AS
+SELECT
+    c.*,
+    avg(
+        ((w.value > (c.before + c.after) / 2) = ((w.at_ns >= c.at_ns) = (c.after > c.before)))
+        ::INTEGER
+    ) AS certainty
+FROM main.value_step_exact('change_step', 'series_value', 'settled') AS c
+JOIN settled AS s ON c.run_id = s.run_id
+JOIN series_window AS w
+    ON c.what = w.what
+    AND c.series_id = w.series_id
+    AND abs(w.at_ns - c.at_ns) < (s.end_ns - s.start_ns) // 8
+GROUP BY ALL
+HAVING c.what = 'loss' OR certainty > 0.85;
+
 CREATE OR REPLACE TEMP TABLE change_found AS
 WITH trend AS (FROM main.value_trend('series_window'))
 SELECT
+    run_id,
     'trend' AS kind,
     what, series_id, at_ns, before, after,
     NULL::BIGINT AS count,
@@ -61,26 +79,27 @@ SELECT
     NULL::BIGINT[][] AS times
 FROM trend
 UNION ALL
-SELECT 'step', s.what, s.series_id, s.at_ns, s.before, s.after, NULL, NULL, NULL, NULL, NULL
-FROM main.value_step_exact('change_step', 'series_value', 'settled') AS s
+SELECT
+    s.run_id, 'step', s.what, s.series_id, s.at_ns, s.before, s.after, NULL, s.certainty, NULL,
+    NULL, NULL
+FROM clear_step AS s
 WHERE NOT EXISTS (FROM trend AS t WHERE t.what = s.what AND t.series_id = s.series_id)
 UNION ALL
-SELECT kind, what, series_id, at_ns, usual, longest_ns, count, NULL, NULL, NULL, times
+SELECT run_id, kind, what, series_id, at_ns, usual, longest_ns, count, NULL, NULL, NULL, times
 FROM main.value_pause($runs, 'series_value', 'settled');
 
 CREATE OR REPLACE TEMP TABLE change_named AS
 WITH node_topic AS (
     SELECT
-        node,
+        run_id, node,
         list_distinct(list(topic_name) FILTER (owner = 'subscription')) AS takes,
         list_distinct(list(topic_name) FILTER (owner = 'publisher')) AS gives
     FROM series
-    GROUP BY node
+    GROUP BY run_id, node
 )
 SELECT
     row_number() OVER (ORDER BY c.at_ns, c.what, c.series_id) AS change_id,
     c.*,
-    coalesce(s.run_id, p.run_id) AS run_id,
     s.node,
     coalesce(s.subject, p.path) AS subject,
     s.process_id, o.host_id, s.topic_name,
@@ -103,7 +122,7 @@ LEFT JOIN (FROM series WHERE object_id = series_id) AS s
     END
 LEFT JOIN named_path AS p ON c.what = 'latency' AND c.series_id = p.path_id
 LEFT JOIN main.process AS o ON s.process_id = o.process_id
-LEFT JOIN node_topic AS n ON s.node = n.node;
+LEFT JOIN node_topic AS n ON s.run_id = n.run_id AND s.node = n.node;
 
 -- A change that explains another one: it comes with it, or before it in the chain.
 CREATE OR REPLACE TEMP TABLE change_cause AS
@@ -123,7 +142,8 @@ SELECT
     ) AS cause_id
 FROM change_named AS c
 JOIN change_named AS x
-    ON c.change_id <> x.change_id
+    ON c.run_id = x.run_id
+    AND c.change_id <> x.change_id
     AND (c.kind = 'trend') = (x.kind = 'trend')
     AND (
         c.kind = 'trend'
@@ -195,7 +215,8 @@ SELECT
     END AS place
 FROM change_named AS c
 JOIN main.occasion($runs, 'series') AS o
-    ON o.at_ns BETWEEN c.at_ns - 1_000_000_000 AND c.at_ns + 1_000_000_000
+    ON c.run_id = o.run_id
+    AND o.at_ns BETWEEN c.at_ns - 1_000_000_000 AND c.at_ns + 1_000_000_000
 WHERE c.kind <> 'trend';
 
 WITH best AS (
@@ -205,21 +226,6 @@ WITH best AS (
         list(sentence ORDER BY apart_ns, sentence) AS sentences
     FROM change_occasion
     GROUP BY change_id
-),
-side AS (
-    SELECT
-        c.change_id,
-        avg(
-            (
-                (w.value > (c.before + c.after) / 2)
-                = ((w.at_ns >= c.at_ns) = (c.after > c.before))
-            )::INTEGER
-        ) AS share
-    FROM change_named AS c
-    JOIN series_window AS w ON c.what = w.what AND c.series_id = w.series_id
-    CROSS JOIN settled AS s
-    WHERE c.kind = 'step' AND abs(w.at_ns - c.at_ns) < (s.end_ns - s.start_ns) // 8
-    GROUP BY c.change_id
 )
 SELECT
     c.run_id, c.at_ns, c.kind, c.what, c.node, c.subject, c.before, c.after,
@@ -228,8 +234,7 @@ SELECT
         ELSE main.duration_text(c.before::BIGINT) || ' → ' || main.duration_text(c.after::BIGINT)
     END AS change,
     c.count,
-    coalesce(c.certainty, s.share) AS certainty,
-    c.low, c.high,
+    c.certainty, c.low, c.high,
     x.what || ' ' || x.subject || coalesce(' of ' || x.node, '') AS follows,
     d.node AS meanwhile_node,
     d.subject AS meanwhile_callback,
@@ -241,6 +246,4 @@ LEFT JOIN change_cause AS f ON c.change_id = f.change_id
 LEFT JOIN change_named AS x ON f.cause_id = x.change_id
 LEFT JOIN best AS b ON c.change_id = b.change_id
 LEFT JOIN change_beside AS d ON c.change_id = d.change_id
-LEFT JOIN side AS s ON c.change_id = s.change_id
-WHERE c.what = 'loss' OR coalesce(s.share, 1) > 0.85
 ORDER BY c.run_id, x.change_id IS NOT NULL, c.at_ns, c.what, c.node, c.subject

@@ -2,6 +2,7 @@
 --     transitions, parameters, goals, rare requests, programs, lost events.
 -- grain: one row per occasion
 -- param: runs, series
+-- column: run_id
 -- column: at_ns BIGINT [epoch ns]  When it happened
 -- column: nodes VARCHAR[]  Nodes that it is of
 -- column: topics VARCHAR[]  Topics that it is about
@@ -10,6 +11,7 @@
 CREATE OR REPLACE MACRO main.occasion(runs, series) AS TABLE
 WITH life AS (
     SELECT
+        n.run_id,
         n.full_name AS node,
         n.created_ns, p.host_id, p.process_id, p.last_seen_ns, r.start_ns, r.end_ns,
         list_distinct(list(s.topic_name) FILTER (s.topic_name IS NOT NULL)) AS topics,
@@ -24,11 +26,11 @@ WITH life AS (
 -- The last message on each topic.
 heard AS (
     SELECT
-        s.topic_name,
+        s.run_id, s.topic_name,
         max(b.start_ns) AS last_ns
     FROM main.publication AS b
     JOIN query_table(series) AS s ON s.owner = 'publisher' AND b.publisher_id = s.object_id
-    GROUP BY s.topic_name
+    GROUP BY s.run_id, s.topic_name
 ),
 timed AS (
     SELECT DISTINCT c.process_id
@@ -49,7 +51,7 @@ object AS (
 ),
 program AS (
     SELECT
-        host_id,
+        run_id, host_id,
         coalesce(left(regexp_replace(command, '(^| )[^ ]*/', '\1', 'g'), 40), name) AS program,
         pid, start_ns,
         cpu_ns / (end_ns - start_ns) AS cpus
@@ -58,7 +60,7 @@ program AS (
 ),
 taken AS (
     SELECT
-        o.host_id,
+        o.run_id, o.host_id,
         coalesce(o.program, '?') AS program,
         p.start_ns, p.end_ns
     FROM main.preemptor AS p
@@ -66,6 +68,7 @@ taken AS (
     WHERE list_contains(runs, o.run_id) AND NOT coalesce(o.is_recorder, false)
 )
 SELECT
+    run_id,
     created_ns AS at_ns,
     [node] AS nodes,
     topics, host_id,
@@ -74,7 +77,7 @@ FROM life
 WHERE created_ns > start_ns + 1_000_000_000
 UNION ALL
 SELECT
-    last_seen_ns,
+    run_id, last_seen_ns,
     [node],
     topics, host_id,
     printf('%s is not seen any more', node)
@@ -85,12 +88,14 @@ WHERE l.last_seen_ns < l.end_ns - 1_000_000_000
         l.process_id IN (SELECT process_id FROM timed)
         OR EXISTS (
             FROM heard AS h
-            WHERE list_contains(l.takes, h.topic_name) AND h.last_ns > l.last_seen_ns + 100_000_000
+            WHERE h.run_id = l.run_id
+                AND list_contains(l.takes, h.topic_name)
+                AND h.last_ns > l.last_seen_ns + 100_000_000
         )
     )
 UNION ALL
 SELECT
-    o.created_ns,
+    n.run_id, o.created_ns,
     [n.full_name],
     [o.topic_name],
     p.host_id,
@@ -101,7 +106,7 @@ JOIN main.process AS p ON n.process_id = p.process_id
 WHERE o.created_ns > n.created_ns + 1_000_000_000
 UNION ALL
 SELECT
-    t.at_ns,
+    t.run_id, t.at_ns,
     [n.full_name],
     [],
     p.host_id,
@@ -112,7 +117,7 @@ JOIN main.process AS p ON n.process_id = p.process_id
 WHERE list_contains(runs, t.run_id)
 UNION ALL
 SELECT
-    b.start_ns,
+    b.run_id, b.start_ns,
     [n.full_name],
     [],
     p.host_id,
@@ -125,6 +130,7 @@ WHERE list_contains(runs, b.run_id) AND u.topic_name = '/parameter_events'
     AND b.start_ns > n.created_ns + 1_000_000_000
 UNION ALL
 SELECT
+    g.run_id,
     coalesce(g.sent_ns, g.taken_ns),
     list_filter([m.full_name, n.full_name], lambda name: name IS NOT NULL),
     [],
@@ -138,6 +144,7 @@ LEFT JOIN main.node AS m ON c.node_id = m.node_id
 WHERE list_contains(runs, g.run_id)
 UNION ALL
 SELECT
+    q.run_id,
     coalesce(q.sent_ns, q.taken_ns),
     list_filter([m.full_name, n.full_name], lambda name: name IS NOT NULL),
     [],
@@ -152,29 +159,32 @@ WHERE list_contains(runs, q.run_id)
     AND NOT coalesce(v.is_internal, c.is_internal, false)
     AND coalesce(v.service_name, c.service_name) NOT LIKE '%/_action/%'
 -- A service that is called all the time is no occasion.
-QUALIFY count(*) OVER (PARTITION BY coalesce(v.service_name, c.service_name)) <= 5
+QUALIFY count(*) OVER (PARTITION BY q.run_id, coalesce(v.service_name, c.service_name)) <= 5
 UNION ALL
 SELECT
+    run_id,
     min(start_ns) FILTER (cpus > 0.2),
     [],
     [],
     host_id,
     printf('%s (pid %d) used %.1f CPUs', program, pid, max(cpus))
 FROM program
-GROUP BY host_id, program, pid
+GROUP BY run_id, host_id, program, pid
 HAVING max(cpus) > 0.2
 UNION ALL
 SELECT
+    run_id,
     min(start_ns),
     [],
     [],
     host_id,
     printf('%s took the CPU', program)
 FROM taken
-GROUP BY host_id, program
+GROUP BY run_id, host_id, program
 HAVING sum(end_ns - start_ns) > 20_000_000
 UNION ALL
 SELECT
+    run_id,
     min(start_ns),
     [],
     [],
@@ -182,4 +192,4 @@ SELECT
     printf('events were lost (%s)', kind)
 FROM main.gap
 WHERE list_contains(runs, run_id) AND kind = 'loss'
-GROUP BY kind, start_ns // 1_000_000_000
+GROUP BY run_id, kind, start_ns // 1_000_000_000

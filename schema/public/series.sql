@@ -13,7 +13,17 @@
 -- column: is_timer BOOLEAN  Whether it is the callback of a timer
 -- column: series_id
 CREATE OR REPLACE MACRO main.series(runs) AS TABLE
-WITH object AS (
+WITH endpoint AS (
+    SELECT
+        'publisher' AS owner,
+        publisher_id AS object_id,
+        run_id, process_id, node_id, topic_name, is_internal
+    FROM main.publisher
+    UNION ALL
+    SELECT 'subscription', subscription_id, run_id, process_id, node_id, topic_name, is_internal
+    FROM main.subscription
+),
+object AS (
     SELECT
         c.run_id,
         'callback' AS owner,
@@ -27,24 +37,12 @@ WITH object AS (
     LEFT JOIN main.subscription AS s ON c.subscription_id = s.subscription_id
     UNION ALL
     SELECT
-        b.run_id,
-        'publisher',
-        b.publisher_id,
+        e.run_id, e.owner, e.object_id,
         main.node_label(n.full_name, p.name, p.pid),
-        b.topic_name, b.process_id, b.topic_name, b.is_internal, false
-    FROM main.publisher AS b
-    JOIN main.process AS p ON b.process_id = p.process_id
-    LEFT JOIN main.node AS n ON b.node_id = n.node_id
-    UNION ALL
-    SELECT
-        s.run_id,
-        'subscription',
-        s.subscription_id,
-        main.node_label(n.full_name, p.name, p.pid),
-        s.topic_name, s.process_id, s.topic_name, s.is_internal, false
-    FROM main.subscription AS s
-    JOIN main.process AS p ON s.process_id = p.process_id
-    LEFT JOIN main.node AS n ON s.node_id = n.node_id
+        e.topic_name, e.process_id, e.topic_name, e.is_internal, false
+    FROM endpoint AS e
+    JOIN main.process AS p ON e.process_id = p.process_id
+    LEFT JOIN main.node AS n ON e.node_id = n.node_id
 )
 SELECT
     run_id, owner, object_id, node, subject, process_id, topic_name, is_internal, is_timer,

@@ -2,6 +2,7 @@
 --     few values of many count. Series with fewer than 16 windows that have values are left out.
 -- grain: one row per series and window with values
 -- param: series_values, settled
+-- column: run_id
 -- column: what VARCHAR  As in main.series_value
 -- column: series_id
 -- column: at_ns BIGINT [epoch ns]  Its first value
@@ -20,19 +21,19 @@ WITH counted AS (
 ),
 windowed AS (
     SELECT
-        v.what, v.series_id,
+        v.run_id, v.what, v.series_id,
         (v.at_ns - s.start_ns) * c.windows // (s.end_ns - s.start_ns + 1) AS place,
         min(v.at_ns) AS at_ns,
         median(v.value) AS median,
         avg(v.value) AS mean
     FROM query_table(series_values) AS v
-    CROSS JOIN query_table(settled) AS s
+    JOIN query_table(settled) AS s ON v.run_id = s.run_id
     JOIN counted AS c ON v.what = c.what AND v.series_id = c.series_id
     WHERE v.at_ns >= s.start_ns AND v.at_ns < s.end_ns AND v.value IS NOT NULL
-    GROUP BY v.what, v.series_id, place
+    GROUP BY v.run_id, v.what, v.series_id, place
 )
 SELECT
-    what, series_id, at_ns,
+    run_id, what, series_id, at_ns,
     CASE WHEN what IN ('timer', 'topic', 'loss') THEN mean ELSE median END AS value,
     row_number() OVER in_time AS number
 FROM windowed

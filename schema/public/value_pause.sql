@@ -2,6 +2,7 @@
 --     for much longer than they usually do. Pauses in which a trace has a gap are left out.
 -- grain: one row per series and kind
 -- param: runs, series_values, settled
+-- column: run_id
 -- column: kind VARCHAR  'stop', 'begin' or 'gap'
 -- column: what VARCHAR  'timer' or 'topic'
 -- column: series_id
@@ -13,45 +14,45 @@
 CREATE OR REPLACE MACRO main.value_pause(runs, series_values, settled) AS TABLE
 WITH usual AS (
     SELECT
-        v.what, v.series_id,
+        v.run_id, v.what, v.series_id,
         median(v.value) AS median_ns,
         quantile_cont(v.value, 0.95) AS p95_ns,
         max(v.value) AS longest_ns,
         min(v.at_ns) AS first_ns,
         max(v.at_ns) AS last_ns
     FROM query_table(series_values) AS v
-    CROSS JOIN query_table(settled) AS s
+    JOIN query_table(settled) AS s ON v.run_id = s.run_id
     WHERE v.what IN ('timer', 'topic') AND v.at_ns >= s.start_ns AND v.at_ns < s.end_ns
-    GROUP BY v.what, v.series_id
+    GROUP BY v.run_id, v.what, v.series_id
     HAVING count(v.value) >= 10
 ),
 gap AS (
-    SELECT start_ns, end_ns FROM main.gap WHERE list_contains(runs, run_id)
+    SELECT run_id, start_ns, end_ns FROM main.gap WHERE list_contains(runs, run_id)
 ),
 pause AS (
     SELECT
-        v.what, v.series_id, u.median_ns,
+        v.run_id, v.what, v.series_id, u.median_ns,
         'gap' AS kind,
         v.at_ns - v.value::BIGINT AS from_ns,
         v.at_ns AS to_ns
     FROM query_table(series_values) AS v
-    CROSS JOIN query_table(settled) AS s
+    JOIN query_table(settled) AS s ON v.run_id = s.run_id
     JOIN usual AS u ON v.what = u.what AND v.series_id = u.series_id
     WHERE from_ns >= s.start_ns AND to_ns < s.end_ns
         AND v.value > 2 * u.p95_ns AND v.value > u.median_ns + 50_000_000
     UNION ALL
-    SELECT u.what, u.series_id, u.median_ns, 'stop', u.last_ns, s.end_ns
+    SELECT u.run_id, u.what, u.series_id, u.median_ns, 'stop', u.last_ns, s.end_ns
     FROM usual AS u
-    CROSS JOIN query_table(settled) AS s
+    JOIN query_table(settled) AS s ON u.run_id = s.run_id
     WHERE s.end_ns - u.last_ns > greatest(10 * u.p95_ns, 2 * u.longest_ns, 1_000_000_000)
     UNION ALL
-    SELECT u.what, u.series_id, u.median_ns, 'begin', s.start_ns, u.first_ns
+    SELECT u.run_id, u.what, u.series_id, u.median_ns, 'begin', s.start_ns, u.first_ns
     FROM usual AS u
-    CROSS JOIN query_table(settled) AS s
+    JOIN query_table(settled) AS s ON u.run_id = s.run_id
     WHERE u.first_ns - s.start_ns > greatest(10 * u.p95_ns, 2 * u.longest_ns, 1_000_000_000)
 )
 SELECT
-    p.kind, p.what, p.series_id,
+    p.run_id, p.kind, p.what, p.series_id,
     min(CASE WHEN p.kind = 'begin' THEN p.to_ns ELSE p.from_ns END) AS at_ns,
     any_value(p.median_ns) AS usual,
     max(p.to_ns - p.from_ns) AS longest_ns,
@@ -61,7 +62,8 @@ SELECT
 FROM pause AS p
 WHERE NOT EXISTS (
     FROM gap AS g
-    WHERE g.start_ns < p.to_ns
+    WHERE g.run_id = p.run_id
+        AND g.start_ns < p.to_ns
         AND g.end_ns > p.from_ns
         AND (
             p.kind = 'gap'
@@ -70,4 +72,4 @@ WHERE NOT EXISTS (
                 > p.to_ns - p.from_ns
         )
 )
-GROUP BY p.kind, p.what, p.series_id
+GROUP BY p.run_id, p.kind, p.what, p.series_id

@@ -5,6 +5,7 @@
 --     what varies all the time is a change, nor what grows all the time.
 -- grain: one row per change
 -- param: windows
+-- column: run_id
 -- column: what VARCHAR  As in main.series_value
 -- column: series_id
 -- column: at_ns BIGINT [epoch ns]  The first value of the first window behind it
@@ -14,7 +15,7 @@
 CREATE OR REPLACE MACRO main.value_step(windows) AS TABLE
 WITH beside AS (
     SELECT
-        w.what, w.series_id, w.at_ns, w.number, h.width,
+        w.run_id, w.what, w.series_id, w.at_ns, w.number, h.width,
         list(w.value) OVER (around ROWS BETWEEN h.width PRECEDING AND 1 PRECEDING) AS before,
         list(w.value) OVER (around ROWS BETWEEN CURRENT ROW AND h.width - 1 FOLLOWING) AS after
     FROM query_table(windows) AS w
@@ -23,7 +24,7 @@ WITH beside AS (
 ),
 compared AS (
     SELECT
-        what, series_id, at_ns, number, width,
+        run_id, what, series_id, at_ns, number, width,
         list_median(before) AS before,
         list_median(after) AS after,
         list_aggregate(before, 'quantile_cont', [0.1, 0.9]) AS ends_before,
@@ -36,7 +37,7 @@ compared AS (
 noise AS (
     SELECT
         what, series_id,
-        1.05 * median(abs(step)) AS deviation
+        median(abs(step)) AS deviation
     FROM (
         SELECT
             what, series_id,
@@ -52,7 +53,7 @@ judged AS (
         ends_after[1] > ends_before[2] OR ends_after[2] < ends_before[1] AS is_apart,
         greatest(
             n.deviation,
-            (ends_before[2] - ends_before[1] + ends_after[2] - ends_after[1]) / 5.1,
+            (ends_before[2] - ends_before[1] + ends_after[2] - ends_after[1]) / 5,
             1e-9
         ) * c.scale AS deviation,
         greatest(
@@ -62,7 +63,7 @@ judged AS (
     JOIN noise AS n ON c.what = n.what AND c.series_id = n.series_id
 )
 SELECT
-    what, series_id, at_ns, before, after,
+    run_id, what, series_id, at_ns, before, after,
     size / deviation AS score,
     number
 FROM judged
@@ -71,7 +72,7 @@ WHERE is_apart
     AND size > 4 * usual
     AND CASE
         WHEN what = 'loss' THEN size > 0.05
-        ELSE size > 1_000_000 AND greatest(before / after, after / before) > 1.09
+        ELSE size > 1_000_000 AND greatest(before / after, after / before) >= 1.1
     END
 WINDOW
     near AS (

@@ -3,6 +3,7 @@
 --     closer to the line than to one level, and the ends of the line differ by a third or more.
 -- grain: one row per series with a trend
 -- param: windows
+-- column: run_id
 -- column: what VARCHAR  As in main.series_value
 -- column: series_id
 -- column: at_ns BIGINT [epoch ns]  Where the line begins
@@ -13,16 +14,17 @@
 CREATE OR REPLACE MACRO main.value_trend(windows) AS TABLE
 WITH coarse AS (
     SELECT
-        what, series_id,
+        run_id, what, series_id,
         median(value) AS value,
         min(at_ns) AS at_ns
     FROM query_table(windows)
     WHERE what NOT IN ('timer', 'topic', 'loss')
-    GROUP BY what, series_id, number // 4
+    GROUP BY run_id, what, series_id, number // 4
 ),
 slope AS (
     SELECT
         a.what, a.series_id,
+        min(a.at_ns) AS at_ns,
         quantile_cont((b.value - a.value) / (b.at_ns - a.at_ns), [0.05, 0.5, 0.95]) AS slopes,
         avg(sign(b.value - a.value)) AS direction
     FROM coarse AS a
@@ -32,25 +34,16 @@ slope AS (
 ),
 line AS (
     SELECT
-        c.what, c.series_id, s.slopes, s.direction,
+        c.run_id, c.what, c.series_id, s.at_ns, s.slopes, s.direction,
         median(c.value) AS level,
-        min(c.at_ns) AS at_ns,
         max(c.at_ns) AS until_ns,
-        median(c.value - s.slopes[2] * (c.at_ns - f.first_ns)) AS base
+        median(c.value - s.slopes[2] * (c.at_ns - s.at_ns)) AS base
     FROM coarse AS c
     JOIN slope AS s ON c.what = s.what AND c.series_id = s.series_id
-    JOIN (
-        SELECT
-            what, series_id,
-            min(at_ns) AS first_ns
-        FROM coarse
-        GROUP BY what, series_id
-    ) AS f
-        ON c.what = f.what AND c.series_id = f.series_id
-    GROUP BY c.what, c.series_id, s.slopes, s.direction
+    GROUP BY c.run_id, c.what, c.series_id, s.at_ns, s.slopes, s.direction
 )
 SELECT
-    l.what, l.series_id, l.at_ns,
+    l.run_id, l.what, l.series_id, l.at_ns,
     l.base AS before,
     l.base + l.slopes[2] * (l.until_ns - l.at_ns) AS after,
     abs(l.direction) AS certainty,
