@@ -210,6 +210,29 @@ def test_tasks_go_on_for_what_made_them(robot: Robot) -> None:
     ]
 
 
+def test_of_too_many_functions_the_others_share_a_number(robot: Robot) -> None:
+    said = robot.run("""
+        import sys
+        tracer = sys.modules["_msgflow_rclpy"]
+        tracer._MOST_FUNCTIONS = 2
+
+        def asking(message):
+            for number in range(5):
+                def later():
+                    pass
+                later.__qualname__ = "later%d" % number
+                executor.create_task(later)
+
+        executor.ready = [(subscription.Subscription(7, asking), [1])]
+        executor.spin_once(); executor.spin_once()
+        print(len(tracer._told))
+    """)[1]
+    # Two of their own, and one for the others: what a robot makes anew costs no memory.
+    assert said == "3\nover\n"
+    named = [line.rpartition(" ")[2] for line in robot.lines("#msgflow function")]
+    assert named == ["__main__:later0", "__main__:later1", "(others)"]
+
+
 JOBS = """
     import queue, threading, time
     from concurrent.futures import ThreadPoolExecutor

@@ -359,10 +359,10 @@ def _origin():
 
 
 def _numbered(symbol, origin, callback=None, source=""):
+    if (symbol, origin) not in _functions and len(_functions) >= _MOST_FUNCTIONS:
+        symbol, origin = "(others)", 0
     number = _functions.get((symbol, origin))
     if number is None:
-        if len(_functions) >= _MOST_FUNCTIONS:
-            symbol, origin = "(others)", 0
         number, source = next(_numbers), source or _source(callback)
         # Before another thread may get the number.
         _told[number] = symbol, source, origin
