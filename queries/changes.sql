@@ -178,30 +178,27 @@ GROUP BY c.change_id;
 CREATE OR REPLACE TEMP TABLE change_beside AS
 WITH pause AS (
     SELECT
-        change_id, process_id,
-        unnest(times) AS ends
-    FROM change_named
-    WHERE kind = 'gap'
-),
-total AS (
-    SELECT
-        change_id,
-        sum(ends[2] - ends[1]) AS pause_ns
-    FROM pause
-    GROUP BY change_id
+        change_id AS id,
+        process_id,
+        ends[1] AS start_ns,
+        ends[2] AS end_ns
+    FROM (
+        SELECT
+            change_id, process_id,
+            unnest(times) AS ends
+        FROM change_named
+        WHERE kind = 'gap'
+    )
 )
 SELECT
-    p.change_id, s.node, s.subject,
-    sum(least(i.end_ns, p.ends[2]) - greatest(i.start_ns, p.ends[1])) / any_value(t.pause_ns)
-        AS share
-FROM pause AS p
-JOIN total AS t ON p.change_id = t.change_id
-JOIN main.callback_instance AS i
-    ON p.process_id = i.process_id AND i.start_ns < p.ends[2] AND i.end_ns > p.ends[1]
-JOIN series AS s ON s.owner = 'callback' AND i.callback_id = s.object_id
-GROUP BY p.change_id, s.node, s.subject
-HAVING share >= 0.5
-QUALIFY row_number() OVER (PARTITION BY p.change_id ORDER BY share DESC, s.node, s.subject) = 1;
+    b.id AS change_id,
+    l.node,
+    l.label AS subject,
+    b.share
+FROM main.callback_beside('pause') AS b
+JOIN main.callback_label AS l ON b.alike_id = l.callback_id
+WHERE b.share >= 0.5 AND NOT l.is_internal
+QUALIFY row_number() OVER (PARTITION BY b.id ORDER BY b.share DESC, b.alike_id) = 1;
 
 CREATE OR REPLACE TEMP TABLE change_occasion AS
 SELECT

@@ -108,39 +108,30 @@ FROM loop_round AS r
 JOIN (SELECT DISTINCT thread_id, target_ns FROM target) AS t ON r.thread_id = t.thread_id
 WHERE NOT r.is_loss_affected AND r.next_ns IS NOT NULL;
 
-WITH beside AS (
+WITH overrun AS (
     SELECT
-        r.thread_id, k.alike_id,
-        sum(least(i.end_ns, r.next_ns) - greatest(i.start_ns, r.start_ns))
-            / any_value(o.overrun_ns) AS share
+        r.thread_id AS id,
+        h.process_id, r.start_ns,
+        r.next_ns AS end_ns
     FROM loop_measured AS r
     JOIN main.thread AS h ON r.thread_id = h.thread_id
-    JOIN main.callback_instance AS i
-        ON h.process_id = i.process_id AND i.start_ns < r.next_ns AND i.end_ns > r.start_ns
-    JOIN main.callback_alike AS k ON i.callback_id = k.callback_id
-    JOIN (
-        SELECT
-            thread_id,
-            sum(next_ns - start_ns) AS overrun_ns
-        FROM loop_measured
-        WHERE is_overrun
-        GROUP BY thread_id
-    ) AS o ON r.thread_id = o.thread_id
     WHERE r.is_overrun
-    GROUP BY r.thread_id, k.alike_id
-    QUALIFY row_number() OVER (PARTITION BY r.thread_id ORDER BY share DESC, k.alike_id) <= 3
+),
+beside AS (
+    FROM main.callback_beside('overrun')
+    WHERE share >= 0.1
+    QUALIFY row_number() OVER (PARTITION BY id ORDER BY share DESC, alike_id) <= 3
 ),
 meanwhile AS (
     SELECT
-        b.thread_id,
+        b.id AS thread_id,
         string_agg(
             printf('%s %s %.0f %%', l.node, l.label, 100 * b.share),
             ', ' ORDER BY b.share DESC, b.alike_id
         ) AS shares
     FROM beside AS b
     JOIN main.callback_label AS l ON b.alike_id = l.callback_id
-    WHERE b.share >= 0.1
-    GROUP BY b.thread_id
+    GROUP BY b.id
 ),
 measured AS (
     SELECT

@@ -18,11 +18,12 @@ SELECT
     9 AS place,
     node, path, topic_name, harm_ns, p95_ns,
     p95_ns AS run_ns,
-    CASE WHEN node NOT IN (
-        SELECT n.full_name
+    CASE WHEN NOT EXISTS (
         FROM main.node AS n
         JOIN main.process AS p ON n.process_id = p.process_id
-        WHERE p.python_version IS NOT NULL
+        WHERE n.full_name = harm.node
+            AND p.python_version IS NOT NULL
+            AND list_contains($runs, n.run_id)
     ) THEN 'callbacks' END AS lacks,
     [node || topic_name] AS claims
 FROM harm

@@ -41,7 +41,7 @@ SELECT
     c.run_ns AS measured_ns,
     c.running_ns, c.waiting_ns, c.sleeping_ns, c.disk_ns,
     m.node IS NOT NULL AS is_held,
-    g.is_trend, g.since_ns, g.before_ns, g.after_ns, g.occasion
+    g.is_trend, g.since_ns, g.until_ns, g.before_ns, g.after_ns, g.occasion
 FROM named AS h
 LEFT JOIN callback_cpu AS c ON h.node = c.node AND h.callback = c.callback
 LEFT JOIN held_message AS m

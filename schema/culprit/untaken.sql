@@ -1,6 +1,6 @@
 -- title: A service that takes no more requests
--- description: Whoever needs it waits, or goes on without an answer. A callback that never ends
---     explains it.
+-- description: Its clients wait, or go on without an answer. A callback that does not end explains
+--     it.
 -- grain: one row per service
 -- reads: application_path
 -- next: query service-latency --node {node}

@@ -109,7 +109,7 @@ every_output AS MATERIALIZED (
     FROM idle AS d
     JOIN published AS p ON d.node_id = p.node_id
     WHERE d.leading_count = 0
-        -- A node that passes on little may filter, beside a state that it publishes for nobody.
+        -- A node that passes on little may filter, and publish a state that no subscription takes.
         OR p.timer_id IS NOT NULL AND EXISTS (
             FROM store.publisher AS b
             JOIN store.subscription AS s ON b.run_id = s.run_id AND b.topic_name = s.topic_name

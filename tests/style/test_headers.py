@@ -42,6 +42,8 @@ TABLES = {
     " FROM main.callback_instance)",
     "intervals": "(SELECT callback_instance_id AS interval_id, thread_id, start_ns AS from_ns,"
     " end_ns AS to_ns FROM main.callback_instance)",
+    "spans": "(SELECT callback_instance_id AS id, process_id, start_ns, end_ns"
+    " FROM main.callback_instance)",
     "parts": "main.end_to_end_part([1])",
     "series": "main.series([1])",
     "settled": "main.settled([1], NULL, NULL)",

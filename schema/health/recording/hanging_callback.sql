@@ -45,7 +45,7 @@ SELECT
             ELSE printf('usually %.3f ms', u.median_ns / 1e6) END,
         CASE
             WHEN a.sent_ns IS NOT NULL THEN printf(
-                'its request to %s was answered at %.3f s, and nobody took the answer: a'
+                'its request to %s was answered at %.3f s, and the answer was not taken: a'
                 ' synchronous call, in a callback that keeps its executor or group busy',
                 coalesce(d.service_name, 'a service'), (a.sent_ns - r.start_ns) / 1e9
             )

@@ -29,7 +29,7 @@ WITH sent AS (
             run_id, service_name,
             any_value(service_id) AS service_id
         FROM store.service
-        -- Where it records no requests, nobody seems to take them.
+        -- A process that records no requests seems to take none.
         WHERE NOT is_internal AND process_id IN (SELECT process_id FROM derive.call_traced)
         GROUP BY run_id, service_name
         HAVING count(*) = 1

@@ -46,7 +46,7 @@ SELECT
     l.label AS callback,
     -- A Python function has its module in front, a C++ function arguments and template parameters,
     -- one within the other. Of a bound method C++ keeps only the class, of a lambda where it
-    -- stands; that of Python is told by what triggers it.
+    -- stands. What triggers a lambda of Python names it.
     CASE
         WHEN b.is_job THEN NULL
         WHEN contains(f.symbol, '<lambda>') THEN NULL

@@ -47,8 +47,10 @@ chosen AS (
             WHEN run_ns > usual_ns THEN ' (p95)'
             ELSE ''
         END
-        || CASE WHEN NOT is_trend THEN printf(' since %.3g s', since_ns / 1e9) ELSE '' END
-        AS at_times,
+        || CASE WHEN NOT is_trend THEN coalesce(
+            printf(' from %.3g s to %.3g s', since_ns / 1e9, until_ns / 1e9),
+            printf(' since %.3g s', since_ns / 1e9)
+        ) ELSE '' END AS at_times,
         coalesce(topic_name, '?') AS topic
     FROM numbered AS c
     WHERE NOT EXISTS (
@@ -88,7 +90,7 @@ said AS (
             )
             WHEN 'hangs' THEN printf('%s does not end', name) || coalesce(
                 printf(': its request to %s', service_name) || CASE reason
-                    WHEN 'untaken' THEN ' was answered, and nobody took the answer'
+                    WHEN 'untaken' THEN ' was answered, and the answer was not taken'
                     WHEN 'own' THEN ' of its own process was never answered'
                     ELSE ' was never answered'
                 END,

@@ -2,7 +2,7 @@
 --     it publishes afterwards. Of each subscription the last message that it took before counts.
 --     An executor that spins inside of a callback takes messages there, too: each has a callback
 --     of its own, but for the copies of messages that come through intra-process buffers, and in
---     Python for feedback that a client of an action takes for nobody. A coroutine is one call, but
+--     Python for feedback that a client of an action drops. A coroutine is one call, but
 --     takes only while one of its steps runs.
 -- grain: one row per publication inside a callback instance, and subscription it took from before
 CREATE OR REPLACE MACRO derive.link_causal_polled(only_run) AS TABLE
