@@ -207,7 +207,7 @@ def test_a_clock_that_drifts_and_jumps_is_followed(system: RosSystem, analyse: A
     model = analyse(system)
     links = {(published, stamp) for published, stamp, _ in model.rows(LINKS)}
     assert links <= set(slewed.truth)
-    assert len(links) >= 0.85 * len(slewed.truth)
+    assert len(links) >= 0.8 * len(slewed.truth)
 
 
 @pytest.mark.thorough

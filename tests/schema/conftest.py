@@ -25,7 +25,8 @@ RULES = (
 STAGE = """
 CREATE TABLE published (run_id BIGINT DEFAULT 1, clock_id BIGINT DEFAULT 1,
     topic_name VARCHAR DEFAULT '/a', publisher_id BIGINT DEFAULT 1, thread_id BIGINT DEFAULT 1,
-    publication_id BIGINT, written_ns BIGINT, closes_ns BIGINT, goes_on BOOLEAN DEFAULT true);
+    publication_id BIGINT, written_ns BIGINT, closes_ns BIGINT, goes_on BOOLEAN DEFAULT true,
+    last_seen_ns BIGINT DEFAULT 1_000_000_000_000_000);
 CREATE TABLE message (run_id BIGINT DEFAULT 1, topic_name VARCHAR DEFAULT '/a',
     source_timestamp_ns BIGINT, only_subscription_id BIGINT DEFAULT 0, clock_id BIGINT DEFAULT 1,
     taken_ns BIGINT);

@@ -275,14 +275,25 @@ def test_or_half_of_all_messages(
     assert nearest(rules)[MICROSECOND] == (0 if is_known else None, 1)
 
 
-@pytest.mark.parametrize(("late", "is_found"), [(19_999, True), (20_001, False)])
-def test_beside_strangers_a_message_comes_no_later_than_twice_what_half_of_them_take(
+@pytest.mark.parametrize(("late", "is_found"), [(29_999, True), (30_001, False)])
+def test_beside_strangers_a_message_comes_no_later_than_thrice_what_half_of_them_take(
     rules: duckdb.DuckDBPyConnection, late: int, *, is_found: bool
 ) -> None:
     clock(rules)
     periodic(rules, [10_000] * 9 + [late], 50_000)
     take(rules, PERIOD // 2)
     assert (nearest(rules).get(9 * PERIOD + late) == (9, 1)) == is_found
+
+
+@pytest.mark.parametrize(("soon", "is_found"), [(2_999, False), (3_000, True)])
+def test_beside_strangers_a_message_comes_no_sooner_than_a_third_of_what_nearly_all_take(
+    rules: duckdb.DuckDBPyConnection, soon: int, *, is_found: bool
+) -> None:
+    """One of two hundred comes sooner than the others, so soon that it may be of a stranger."""
+    clock(rules)
+    periodic(rules, [9_000] * 199 + [soon], 50_000)
+    take(rules, PERIOD // 2)
+    assert (nearest(rules).get(199 * PERIOD + soon) == (199, 1)) == is_found
 
 
 def test_what_lost_events_leave_is_of_no_stranger(rules: duckdb.DuckDBPyConnection) -> None:

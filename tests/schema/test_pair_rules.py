@@ -61,6 +61,16 @@ def test_publications_of_one_moment_are_one(rules: duckdb.DuckDBPyConnection) ->
     assert pairs(rules) == [(500, -500, 500)]
 
 
+@pytest.mark.parametrize(("last_seen", "count"), [(10_000, 1), (9_999, 0)])
+def test_what_came_behind_the_end_of_the_process_tells_nothing(
+    rules: duckdb.DuckDBPyConnection, last_seen: int, count: int
+) -> None:
+    publish(rules, 0)
+    rules.execute("UPDATE published SET last_seen_ns = ?", [last_seen])
+    take(rules, (500, 10_000))
+    assert len(pairs(rules)) == count
+
+
 @pytest.mark.parametrize(
     ("count", "stretches"), [(47, 2), (48, 2), (49, 3), (400, 9), (960, 20), (19_200, 134)]
 )

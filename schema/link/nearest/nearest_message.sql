@@ -4,7 +4,7 @@
 --     A message has one publication and a publication one message, the first. A message has no
 --     publication where that would be a guess: where several come into question; where two messages
 --     may both be of one publication, and come as soon as usual; where others publish on the topic,
---     and it came later than is usual; where its clock was set, or the difference of the clocks is
+--     and it came later or sooner than is usual; where its clock was set, or the difference of the clocks is
 --     not known or explains less than half of the messages of each topic.
 -- grain: one row per message that has, or might have, a publication
 -- when: derive.unstamped_call
@@ -94,11 +94,12 @@ strange AS MATERIALIZED (
         AND NOT EXISTS (FROM derive.recording_gap AS g WHERE g.run_id = only_run)
 ),
 -- How long after the begin of a write messages come: half of those of a host, and nearly all of a
--- publisher.
+-- publisher, at least and at most.
 usual AS (
     SELECT
         publisher_id,
-        derive.clock_limit().usual_factor * any_value(median_ns) AS limit_ns,
+        any_value(median_ns) AS median_ns,
+        quantile_disc(delay_ns, 1 - derive.clock_limit().usual_quantile) AS soonest_ns,
         quantile_disc(delay_ns, derive.clock_limit().usual_quantile) AS latest_ns
     FROM (
         SELECT
@@ -117,7 +118,12 @@ candidate AS MATERIALIZED (
             PARTITION BY w.topic_name, w.source_timestamp_ns, w.only_subscription_id
         ) AS candidate_count,
         coalesce(w.delay_ns <= u.latest_ns, false) AS is_prompt,
-        w.topic_name IN (FROM strange) AND NOT coalesce(w.delay_ns <= u.limit_ns, false) AS is_late
+        w.topic_name IN (FROM strange)
+        AND NOT coalesce(
+            w.delay_ns <= derive.clock_limit().usual_factor * u.median_ns
+            AND derive.clock_limit().usual_factor * w.delay_ns >= u.soonest_ns,
+            false
+        ) AS is_unusual
     FROM within AS w
     LEFT JOIN usual AS u ON w.publisher_id = u.publisher_id
 ),
@@ -136,7 +142,7 @@ left_over AS (
     SELECT
         c.topic_name, c.publisher_id, c.source_timestamp_ns, c.only_subscription_id,
         c.publication_id,
-        c.is_missed OR c.is_late OR coalesce(o.is_rivalled, false) AS is_doubtful,
+        c.is_missed OR c.is_unusual OR coalesce(o.is_rivalled, false) AS is_doubtful,
         count(*) OVER (
             PARTITION BY c.topic_name, c.source_timestamp_ns, c.only_subscription_id
         ) AS candidate_count

@@ -4,12 +4,14 @@
 --     follow each other before the thread goes on, each has the time until the next. A publication
 --     has one message: where several could be its own, only the first one counts, whether it is in
 --     the sample or not. Else a burst could as well be one publication later, if its last one
---     takes long. Messages that follow each other vote together, as one stretch of time.
+--     takes long. Messages that follow each other vote together, as one stretch of time. A message
+--     that was received behind the last event of the publishing process has no vote: its
+--     publication may have been behind it, too.
 -- grain: one row per clock, message in the sample and publication that it may be of
 CREATE OR REPLACE MACRO derive.stamp_pair(only_run) AS TABLE
 WITH published AS MATERIALIZED (
     SELECT
-        clock_id, topic_name, publisher_id, written_ns, closes_ns,
+        clock_id, topic_name, publisher_id, written_ns, closes_ns, last_seen_ns,
         row_number() OVER in_order AS position,
         lead(written_ns) OVER in_order AS next_written_ns
     FROM derive.unstamped_publication(only_run)
@@ -17,10 +19,11 @@ WITH published AS MATERIALIZED (
 ),
 taken AS MATERIALIZED (
     SELECT
-        p.clock_id, p.publisher_id, m.source_timestamp_ns, m.only_subscription_id, m.taken_ns,
+        p.clock_id, p.publisher_id, p.last_seen_ns, m.source_timestamp_ns, m.only_subscription_id,
+        m.taken_ns,
         m.clock_id AS taken_clock_id
     FROM derive.unstamped_message(only_run) AS m
-    JOIN (SELECT DISTINCT clock_id, topic_name, publisher_id FROM published) AS p
+    JOIN (SELECT DISTINCT clock_id, topic_name, publisher_id, last_seen_ns FROM published) AS p
         ON m.topic_name = p.topic_name
 ),
 -- How far another clock is from this one: the least time from stamp to take, in the beginning.
@@ -46,7 +49,9 @@ heard AS (
         ) AS received_ns
     FROM taken AS t
     JOIN apart AS a ON t.clock_id = a.clock_id AND t.taken_clock_id = a.taken_clock_id
-    GROUP BY t.clock_id, t.publisher_id, t.source_timestamp_ns, t.only_subscription_id
+    GROUP BY
+        t.clock_id, t.publisher_id, t.last_seen_ns, t.source_timestamp_ns, t.only_subscription_id
+    HAVING received_ns <= t.last_seen_ns
 ),
 message AS (
     SELECT

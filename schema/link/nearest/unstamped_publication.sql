@@ -5,7 +5,7 @@
 CREATE OR REPLACE MACRO derive.unstamped_publication(only_run) AS TABLE
 SELECT
     b.run_id, h.clock_id, p.topic_name, b.publisher_id, b.thread_id, b.publication_id, b.written_ns,
-    b.is_without_event,
+    b.is_without_event, o.last_seen_ns,
     coalesce(b.next_event_ns < k.resumed_ns, b.next_event_ns IS NOT NULL) AS goes_on,
     CASE
         WHEN goes_on THEN b.next_event_ns
