@@ -88,6 +88,7 @@ only_line AS (
     SELECT
         clock_id,
         any_value(segment) AS segment,
+        max(CASE WHEN agrees THEN stretch END) AS last_stretch,
         any_value(middle_ns) AS middle_ns,
         any_value(difference_ns) AS difference_ns,
         any_value(drift_ppb) AS drift_ppb,
@@ -96,7 +97,8 @@ only_line AS (
     GROUP BY clock_id
     HAVING count(DISTINCT segment) = 1
 ),
--- What is not told does not say that such a clock was set, if the line may hold there.
+-- What is not told does not say that such a clock was set, if the line may hold there and does so
+-- later: a clock that was set stays so.
 -- Where a clock was set back, messages of two times have the same stamps: no difference explains
 -- as many as usual.
 told AS (
@@ -110,6 +112,7 @@ told AS (
         coalesce(
             l.agrees,
             NOT c.is_told
+            AND c.stretch < o.last_stretch
             AND o.difference_ns + ((c.at_ns - o.middle_ns) * o.drift_ppb / 1e9)::BIGINT
                 BETWEEN c.least_ns AND c.greatest_ns,
             false
