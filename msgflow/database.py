@@ -586,8 +586,8 @@ class Database:
         given = (publication_id, take_id, callback_instance_id, None, None)
         number, topic, run_id = self._ask(find_take, self._ask(_start, place, given, at, run))
         return self.query(
-            "critical-path", run=run_id, take=number, from_=from_, to=[topic], case=case, by=by,
-            detail=detail, internal=internal,
+            "critical-path", run=run_id, take=number, from_=from_, to=[topic] if topic else None,
+            case=case, by=by, detail=detail, internal=internal,
         )  # fmt: skip
 
     def flow_page(self, flow: Flow, path: str | Path) -> int:

@@ -13,7 +13,7 @@ import json
 import tempfile
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from itertools import accumulate
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -262,9 +262,11 @@ class _Tools:
 
         run_a, run_b: baseline, and what to compare with it: name or id. Or run and window, such as
         ['0s..60s', '60s..120s']. what: 'paths', 'ends' (between two topics), 'callbacks', 'topics'.
+        Of paths, the first notes name what changed most.
         """
         found = self._database.compare(run_a, run_b, run=run, window=window or (), what=what)
-        return _rows(found.changes(only_different=False), limit)
+        changes = found.changes(only_different=False)
+        return _rows(replace(changes, notes=[*found.lines, *changes.notes]), limit)
 
     def verify(self, requirements: str, run: str | None = None) -> str:
         """Check a run against requirements: passed, failed, not measured, no data.

@@ -23,7 +23,8 @@ RECORDED = {
     "has_usage": "EXISTS (FROM store.thread_usage)",
     "has_calls": "EXISTS (FROM store.request)",
     "has_turns": "EXISTS (FROM store.flow_call)"
-    " OR EXISTS (FROM store.link_causal WHERE kind <> 'direct')",
+    " OR EXISTS (FROM store.link_causal WHERE kind <> 'direct')"
+    " OR EXISTS (FROM store.callback_instance WHERE continues_id IS NOT NULL)",
     "has_teams": "EXISTS (FROM derive.executor_size WHERE thread_count > 1)",
     "has_gaps": "EXISTS (FROM store.gap)",
     "has_pauses": "EXISTS (FROM store.gap WHERE kind = 'pause')",

@@ -1,6 +1,7 @@
 -- title: Messages that wait, for what is not known
 -- description: They are on the way, or their executor does not take them, although it runs nothing.
---     Where callbacks are known to keep them waiting longer, these are the culprit.
+--     Where callbacks are known to keep them waiting ten times as long, these are the culprit; if
+--     they wait too little to notice, as long.
 -- grain: one row per topic and node that takes it
 -- reads: application_path, blame, callback_use, noticed
 -- next: query waits --by instance --slowest 5 --node {node}
@@ -35,7 +36,7 @@ LEFT JOIN (
 CROSS JOIN noticed AS l
 WHERE b.node IS NULL AND NOT b.is_cpu AND b.waiting_node IS NOT NULL
     AND b.mean_ns >= l.least_ns
-    AND b.mean_ns > (
+    AND b.mean_ns > CASE WHEN b.p95_ns >= l.late_ns THEN l.of_path ELSE 1 END * (
         SELECT coalesce(sum(k.mean_ns), 0)
         FROM blame AS k
         WHERE k.node IS NOT NULL AND k.path = b.path AND k.topic_name = b.topic_name

@@ -317,14 +317,15 @@ SELECT
             WHEN has_overflowed THEN 'overwritten'
             ELSE 'before_discovery'
         END
-        WHEN publisher_taken_ns IS NULL AND is_connected AND has_stopped THEN 'no_longer_taken'
+        WHEN publisher_taken_ns IS NULL AND is_connected AND has_stopped
+            THEN CASE WHEN replaced_ns IS NULL THEN 'no_longer_taken' ELSE 'subscription_ended' END
         WHEN publisher_taken_ns IS NOT NULL AND has_failed_take THEN 'take_failed'
         WHEN publisher_taken_ns IS NOT NULL AND waited_ns IS NOT NULL THEN 'not_delivered'
         WHEN is_connected AND newer_count >= queue_depth THEN 'overwritten'
         WHEN publisher_taken_ns IS NOT NULL AND newer_count < queue_depth
             THEN 'lost_in_transport'
         WHEN any_taken_ns IS NULL AND (newer_count < queue_depth OR newer_count = 0)
-            THEN 'pending_at_end'
+            THEN CASE WHEN replaced_ns IS NULL THEN 'pending_at_end' ELSE 'subscription_ended' END
         ELSE 'unknown'
     END AS reason
 FROM judged

@@ -1,12 +1,13 @@
 -- description: Where the flow of each publication can be said to begin: with the callback instance
 --     of the timer (or other callback without a message) that published it, or that called the
 --     service that did; else with the publication itself. It is a source if no taken message led to
---     it. The route (derive.flow_caller) starts at the instance that called; if none did, it is
---     empty. The flow of a message whose publisher is not traced begins with its take, or before
---     that with its stamp, if the clock of the publisher is that of the reader: of all messages
---     that the subscription took, the quickest came neither before its stamp nor later than a
---     message needs. Its publication and its publisher have no rows: the ids of the take and of the
---     subscription stand for them, below 0.
+--     it, and it is not the status of an action whose goal is not known. The route
+--     (derive.flow_caller) starts at the instance that called; if none did, it is empty. The flow
+--     of a message whose publisher is not traced begins with its take, or before that with its
+--     stamp, if the clock of the publisher is that of the reader: of all messages that the
+--     subscription took, the quickest came neither before its stamp nor later than a message needs.
+--     Its publication and its publisher have no rows: the ids of the take and of the subscription
+--     stand for them, below 0.
 -- grain: one row per publication on a topic of the application, and per take of a message whose
 --     publisher is not traced
 CREATE OR REPLACE MACRO derive.flow_root(only_run) AS TABLE
@@ -53,6 +54,7 @@ root AS (
     SELECT
         c.run_id, c.publication_id, c.publisher_id,
         bool_or(c.is_message) AS is_message,
+        any_value(p.topic_name) LIKE '%/\_action/status' ESCAPE '\' AS is_status,
         CASE WHEN NOT bool_or(c.is_message) THEN min(c.callback_instance_id) END
             AS callback_instance_id
     FROM cause AS c
@@ -70,7 +72,7 @@ way AS (
 )
 SELECT
     r.run_id, r.publication_id, r.publisher_id,
-    NOT r.is_message AS is_source,
+    NOT r.is_message AND (w.route IS NOT NULL OR r.is_status IS NOT TRUE) AS is_source,
     CASE WHEN r.callback_instance_id IS NULL THEN 'publication' ELSE 'callback_instance' END
         AS root_kind,
     coalesce(r.callback_instance_id, r.publication_id) AS root_id,
@@ -83,7 +85,7 @@ SELECT
     o.run_id,
     -o.take_id,
     -o.subscription_id,
-    true,
+    o.subscription_id NOT IN (SELECT subscription_id FROM derive.goal_state_subscription),
     'take',
     o.take_id,
     []::BIGINT[],

@@ -1,16 +1,13 @@
 -- description: Subscriptions at which flows end although their node publishes: at least three
 --     messages came, and no callback of theirs led to anything, while timers, other messages or
---     what is outside of callbacks led to publications. If less than half of the callbacks did,
---     to what no other messages led, timers count that publish more. Either the node only
---     consumes the messages, or it keeps them: then a link has to be declared. That is not likely
---     if the messages descend from what the node publishes itself; if messages on another topic
---     led to publications before the first one came, or in shorter callbacks, as keeping takes
---     less time than using; or if what comes outside of callbacks neither answers them one by
---     one, nor comes from a thread that they started. Topics of ROS, topics that the node also
---     publishes on, and inputs of annotations are left out. So are outputs that report on the
---     node: a timer publishes them at most twice a second, nothing follows from them elsewhere,
---     and other nodes publish there, too (/diagnostics), or the node has faster outputs and no
---     node that publishes takes them.
+--     what is outside of callbacks led to publications. If less than half of the callbacks did, to
+--     what no other messages led, timers count that publish more. Either the node only consumes the
+--     messages, or it keeps them: then a link has to be declared. That is not likely if the
+--     messages descend from what the node publishes itself; if messages on another topic led to
+--     publications before the first one came, or in shorter callbacks, as keeping takes less time
+--     than using; or if what comes outside of callbacks neither answers them one by one, nor comes
+--     from a thread that they started. Topics of ROS, topics that the node also publishes on,
+--     inputs of annotations, and heartbeats (derive.heartbeat_topic) are left out.
 -- grain: one row per such subscription, publisher of its node, and timer or subscription whose
 --     callbacks published; one row for what it published outside of callbacks
 -- param: runs
@@ -123,47 +120,14 @@ every_output AS MATERIALIZED (
     GROUP BY ALL
     HAVING count(*) > d.leading_count
 ),
-slow_output AS MATERIALIZED (
-    SELECT o.node_id, o.publisher_id, p.topic_name
-    FROM every_output AS o
-    JOIN store.publisher AS p ON o.publisher_id = p.publisher_id
-    LEFT JOIN store.timer AS t ON o.timer_id = t.timer_id
-    GROUP BY o.node_id, o.publisher_id, p.topic_name
-    HAVING bool_and(2 * t.period_ns >= 1_000_000_000) AND count(o.trigger_id) = 0
-),
-report AS (
-    SELECT s.publisher_id
-    FROM slow_output AS s
-    WHERE s.topic_name NOT IN (
-        SELECT i.topic_name
-        FROM store.flow_hop AS h
-        JOIN store.subscription AS i ON h.from_subscription_id = i.subscription_id
-        WHERE list_contains(runs, h.run_id) AND i.topic_name IS NOT NULL
-    )
-        AND (
-            EXISTS (
-                FROM store.publisher AS p
-                WHERE list_contains(runs, p.run_id)
-                    AND p.topic_name = s.topic_name AND p.node_id <> s.node_id
-            )
-            OR (
-                s.node_id IN (
-                    SELECT node_id
-                    FROM every_output
-                    WHERE publisher_id NOT IN (SELECT publisher_id FROM slow_output)
-                )
-                AND NOT EXISTS (
-                    FROM store.subscription AS i
-                    JOIN store.publisher AS p ON i.node_id = p.node_id
-                    WHERE list_contains(runs, p.run_id)
-                        AND i.topic_name = s.topic_name AND NOT p.is_internal
-                )
-            )
-        )
-),
 output AS (
-    FROM every_output AS o
-    ANTI JOIN report AS r ON o.publisher_id = r.publisher_id
+    FROM every_output
+    WHERE publisher_id NOT IN (
+        SELECT p.publisher_id
+        FROM derive.heartbeat_topic(runs) AS h
+        JOIN store.publisher AS p ON h.topic_name = p.topic_name
+        WHERE list_contains(runs, p.run_id)
+    )
 ),
 -- One after the other, and few that wait at the end.
 queue AS (

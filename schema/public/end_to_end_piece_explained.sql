@@ -7,7 +7,8 @@
 --     callback_instance_id, callback_id, take_id, start_ns and end_ns of main.callback_instance,
 --     busy_min_ns and busy_max_ns of main.executor_wait (NULL: not known)
 -- param: runs
--- param: has_turns BOOLEAN = true  Flows may lead through caches or services; false: none does
+-- param: has_turns BOOLEAN = true  Flows may lead through caches, services or jobs; false: none
+--     does
 -- column: run_id, path_id, flow_id, root_kind, root_id, take_id, latency_ns
 -- column: hop BIGINT  Number of the message on the path that it belongs or leads to; one more than
 --     the last for the callback at the end
@@ -19,7 +20,8 @@
 -- column: busy_min_ns BIGINT [ns]  Least time for which its executor was busy with other callbacks
 --     while a message or request waited
 -- column: busy_max_ns BIGINT [ns]  Most time
--- column: is_turning BOOLEAN  The hop leads through a cache or a service: a part may occur twice
+-- column: is_turning BOOLEAN  The hop leads through a cache, a service or a job: a part may occur
+--     twice
 CREATE OR REPLACE MACRO main.end_to_end_piece_explained(
     flows, trail, callbacks, runs, has_turns := true
 ) AS TABLE
@@ -127,6 +129,18 @@ call AS (
             THEN g.called_key // 8 ELSE coalesce(r.callback_instance_id, q.callback_instance_id)
         END = i.callback_instance_id
 ),
+-- What a callback of Python has a thread of no executor do.
+job AS (
+    SELECT b.publication_id, s.callback_instance_id, s.continues_id
+    FROM store.publication AS b
+    SEMI JOIN passed AS h ON b.publication_id = h.publication_id
+    ASOF JOIN (
+        FROM store.callback_instance
+        WHERE continues_id IS NOT NULL AND list_contains(runs, run_id)
+            AND thread_id NOT IN (SELECT thread_id FROM store.executor_thread)
+    ) AS s ON b.thread_id = s.thread_id AND b.start_ns >= s.start_ns
+    WHERE coalesce(b.start_ns <= s.end_ns, true)
+),
 cached AS (
     SELECT
         c.publication_id, c.entered_id,
@@ -175,6 +189,19 @@ between AS MATERIALIZED (
                 derive.moment('callback', start_ns, NULL, callback_instance_id, callback_id)
             ]
         FROM cached
+        UNION ALL
+        SELECT
+            j.publication_id, j.continues_id, 0,
+            [
+                derive.moment(
+                    'take_to_callback', CASE WHEN e.end_ns < i.start_ns THEN e.end_ns END, NULL,
+                    i.callback_instance_id, i.callback_id
+                ),
+                derive.moment('callback', i.start_ns, NULL, i.callback_instance_id, i.callback_id)
+            ]
+        FROM job AS j
+        JOIN callback AS i ON j.callback_instance_id = i.callback_instance_id
+        LEFT JOIN callback AS e ON j.continues_id = e.callback_instance_id
     )
     GROUP BY publication_id, entered_id
 ),

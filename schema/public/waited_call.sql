@@ -20,7 +20,8 @@
 -- column: served_ns BIGINT [ns]  From start_ns to the response; NULL: the same
 WITH step AS (
     SELECT
-        callback_instance_id,
+        coalesce(continues_id, callback_instance_id) AS callback_instance_id,
+        start_ns, end_ns,
         lead(start_ns) OVER (
             PARTITION BY coalesce(continues_id, callback_instance_id) ORDER BY start_ns
         ) AS resumed_ns
@@ -39,18 +40,20 @@ call AS (
         coalesce(s.start_ns, q.taken_ns) AS start_ns,
         a.sent_ns AS answered_ns,
         a.taken_ns AS returned_ns,
-        a.taken_ns > i.end_ns AS is_awaited
+        a.taken_ns > coalesce(e.end_ns, i.end_ns) AS is_awaited
     FROM main.link_request AS l
     JOIN main.request AS q ON l.request_id = q.request_id
     JOIN main.response AS a ON q.request_id = a.request_id
     JOIN main.callback_instance AS i ON l.callback_instance_id = i.callback_instance_id
-    LEFT JOIN step AS e ON l.callback_instance_id = e.callback_instance_id
+    -- Of a coroutine all requests count as those of its first step.
+    ASOF LEFT JOIN step AS e
+        ON l.callback_instance_id = e.callback_instance_id AND q.sent_ns >= e.start_ns
     LEFT JOIN main.callback_instance AS s ON q.callback_instance_id = s.callback_instance_id
     LEFT JOIN main.client AS c ON q.client_id = c.client_id
     LEFT JOIN main.service AS v ON q.service_id = v.service_id
     LEFT JOIN main.node AS n ON v.node_id = n.node_id
     LEFT JOIN main.process AS r ON v.process_id = r.process_id
-    WHERE a.taken_ns BETWEEN q.sent_ns AND coalesce(e.resumed_ns, i.end_ns)
+    WHERE a.taken_ns BETWEEN q.sent_ns AND coalesce(e.resumed_ns, e.end_ns, i.end_ns)
 )
 SELECT
     run_id, request_id, callback_instance_id, service_id, service_name, server, server_instance_id,

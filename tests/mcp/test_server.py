@@ -19,6 +19,7 @@ from mcp import Client
 from mcp.client.stdio import StdioServerParameters
 from support.thorough import few, thorough
 
+from msgflow.database import Database
 from msgflow.mcp import server as mcp_server
 
 Call = tuple[str, dict[str, Any]]
@@ -116,6 +117,12 @@ def test_why_compare_and_verify(robot_database: Path) -> None:
     assert {"paths", "nodes"} <= {row["section"] for row in others}
     compared = one(robot_database, "compare", window=["0s..1s", "1s..2s"], what="topics")
     assert {"a_median_ns", "b_median_ns"} <= set(compared["rows"][0])
+    windows = ["0s..2s", "2s..7s"]
+    with Database(robot_database) as database:
+        lines = database.compare(run=1, window=windows).lines
+    assert lines
+    said = one(robot_database, "compare", run="1", window=windows)["notes"]
+    assert said[: len(lines)] == list(lines)
     topic = one(robot_database, "run_query", name="topics")["rows"][0]["topic_name"]
     requirements = f"targets:\n  - topic: {topic}\n    rate: '< 1000 Hz'\n"
     verified = one(robot_database, "verify", requirements=requirements)

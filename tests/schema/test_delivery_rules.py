@@ -473,11 +473,13 @@ def test_what_a_publisher_may_have_kept(
 
 
 @pytest.mark.parametrize(
-    ("replaced", "reason"), [(300 * MS, "pending_at_end"), (300 * MS - 1, "subscription_ended")]
+    ("replaced", "reason"),
+    [(None, "pending_at_end"), (400 * MS, "subscription_ended"), (299 * MS, "subscription_ended")],
 )
-def test_replaced_before_the_message_arrived(
-    delivery: Delivery, replaced: int, reason: str
+def test_another_subscription_took_its_place(
+    delivery: Delivery, replaced: int | None, reason: str
 ) -> None:
+    """Before the message arrived, or before it was taken."""
     delivery.lives(replaced_ns=replaced, last_seen_ns=301 * MS, host_end_ns=301 * MS)
     assert delivery.reason(delivery.publish(300 * MS)) == reason
 
@@ -748,10 +750,19 @@ def test_more_messages_are_missing_than_ever_before(
     assert delivery.reason(messages[0]) == reason
 
 
-@pytest.mark.parametrize(("more", "reason"), [(1, "no_longer_taken"), (0, "pending_at_end")])
-def test_a_reader_that_waits_takes_nothing_more(delivery: Delivery, more: int, reason: str) -> None:
+@pytest.mark.parametrize(
+    ("more", "replaced", "reason"),
+    [
+        (1, None, "no_longer_taken"),
+        (1, 399 * MS, "subscription_ended"),
+        (0, None, "pending_at_end"),
+    ],
+)
+def test_a_reader_that_waits_takes_nothing_more(
+    delivery: Delivery, more: int, replaced: int | None, reason: str
+) -> None:
     """Its queue is empty. The message behind the wait has the same word."""
-    delivery.lives(last_seen_ns=400 * MS, host_end_ns=400 * MS)
+    delivery.lives(last_seen_ns=400 * MS, host_end_ns=400 * MS, replaced_ns=replaced)
     usually(delivery, 300_000)
     messages = [delivery.publish(at * MS) for at in (300, 399)]
     delivery.waits(280 * MS, 303 * MS - 1 + more)

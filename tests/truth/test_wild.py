@@ -45,7 +45,7 @@ WORDS = {
         "SELECT count(*) > 2000 FROM stat_delivery WHERE reason = 'never_taken'"
     ),
     "6-destroyed-subscription-lost/groups": (
-        "SELECT count(*) > 6000 FROM stat_delivery WHERE reason = 'no_longer_taken'"
+        "SELECT count(*) > 6000 FROM stat_delivery WHERE reason = 'subscription_ended'"
     ),
     "7-timers": (
         "SELECT count(*) = 0 FROM executor_wait JOIN callback USING (callback_id) JOIN timer "

@@ -166,16 +166,16 @@ const TITLES = {
 
 // Parts of a latency, in the words of msgflow/text/parts.py.
 const PARTS = {
-  network_or_idle: "on the way",
+  network_or_idle: "way or idle",
   until_arrival: "on the way",
   undecided: "way or queue",
   executor_busy: "in the queue",
-  all_threads_busy: "no free thread",
+  all_threads_busy: "waits for a thread",
   blocked: "group is busy",
   executor: "in the executor",
   run_queue: "waits for a CPU",
-  request_to_take: "request on its way",
-  response_to_take: "answer on its way",
+  request_to_take: "request to its take",
+  response_to_take: "answer to its take",
   cache: "in the cache",
   timer: "waits for timer",
   unpublished: "waits for input",

@@ -48,7 +48,7 @@ SELECT
     s.process_id,
     sum(s.number)::BIGINT AS count,
     printf(
-        '%d callbacks on %d of %d threads, and no event of an executor',
+        '%d callbacks on %d of %d threads; what these did in between is not recorded',
         sum(s.number)::BIGINT, count(*), any_value(t.threads)
     ) AS detail
 FROM silent AS s

@@ -1,26 +1,13 @@
 -- kind: inline
 -- description: Nodes between which messages on a topic ended for one reason: who they are, in words
 --     and by the ids of one of each, how many messages, and how many were taken. A node that is
---     destroyed and made again is one. What came after that to its earlier subscription ended with
---     it.
+--     destroyed and made again is one.
 -- grain: one row per topic, publishing node, subscribing node and reason
-WITH replaced AS (
-    SELECT s.subscription_id
-    FROM store.subscription AS s
-    JOIN store.take AS t ON s.subscription_id = t.subscription_id
-    LEFT JOIN store.node AS n ON s.node_id = n.node_id
-    GROUP BY s.subscription_id, s.process_id, n.full_name, s.topic_name, s.created_ns
-    QUALIFY max(t.taken_ns) < max(s.created_ns) OVER (
-        PARTITION BY s.process_id, n.full_name, s.topic_name
-    )
-),
-pair AS (
+WITH pair AS (
     SELECT
         run_id, reason, publisher_id, subscription_id,
         count(*) AS number
     FROM store.undelivered
-    WHERE reason <> 'no_longer_taken'
-        OR subscription_id NOT IN (SELECT subscription_id FROM replaced)
     GROUP BY run_id, reason, publisher_id, subscription_id
     UNION ALL
     SELECT

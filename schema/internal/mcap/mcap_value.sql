@@ -2,26 +2,26 @@
 --     the flow (first arrivals), age of the data at their ends by the output, latency from
 --     publication to take of topics by the take, duration of callbacks and the time for which
 --     executors kept them waiting by their start. A topic has the names of what it measures. If
---     several have them, their identity comes behind. Flows that pass a link that may be another
---     one are a series of their own, /ambiguous.
+--     several have them, their identity comes behind; paths of the same nodes and topics are one.
+--     Flows that pass a link that may be another one are a series of their own, /ambiguous.
 -- grain: one row per value
-WITH flow AS MATERIALIZED (
+WITH named_path AS MATERIALIZED (
+    SELECT
+        path_id, alike_id,
+        concat(
+            'path', string_split(path, ' → ')[1], '/to', string_split(path, ' → ')[-1],
+            CASE WHEN min(alike_id) OVER ends < max(alike_id) OVER ends
+                THEN '/' || alike_id ELSE '' END
+        ) AS subject
+    FROM main.flow_path($runs, only_paths := true)
+    WINDOW ends AS (PARTITION BY string_split(path, ' → ')[1], string_split(path, ' → ')[-1])
+),
+flow AS MATERIALIZED (
     SELECT
         path_id, root_ns, sink_ns, take_id, latency_ns, is_first, is_newest,
         CASE WHEN is_ambiguous THEN '/ambiguous' ELSE '' END AS doubt
-    FROM main.end_to_end($runs)
+    FROM main.end_to_end($runs, paths := 'named_path')
     WHERE status = 'reached' AND latency_ns IS NOT NULL AND (is_first OR is_newest)
-),
-path AS MATERIALIZED (
-    SELECT
-        path_id,
-        concat(
-            'path', string_split(path, ' → ')[1], '/to', string_split(path, ' → ')[-1],
-            CASE WHEN count(*) OVER (
-                PARTITION BY string_split(path, ' → ')[1], string_split(path, ' → ')[-1]
-            ) > 1 THEN '/' || path_id ELSE '' END
-        ) AS subject
-    FROM main.flow_path($runs, only_paths := true)
 ),
 subscription AS MATERIALIZED (
     SELECT
@@ -52,7 +52,7 @@ value AS (
         f.root_ns AS at_ns,
         f.latency_ns AS value_ns
     FROM flow AS f
-    JOIN path AS p ON f.path_id = p.path_id
+    JOIN named_path AS p ON f.path_id = p.path_id
     WHERE f.is_first
     UNION ALL
     SELECT
@@ -60,7 +60,7 @@ value AS (
         f.sink_ns,
         f.sink_ns - f.root_ns
     FROM flow AS f
-    JOIN path AS p ON f.path_id = p.path_id
+    JOIN named_path AS p ON f.path_id = p.path_id
     WHERE f.is_newest
     UNION ALL
     SELECT

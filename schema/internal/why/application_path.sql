@@ -1,12 +1,10 @@
 -- title: Paths of the application
--- description: The paths that an explanation may blame. The status and feedback of actions, the
---     clock, diagnostics, and heartbeats are not among them, unless there is nothing else or the
---     caller asks for a place. A heartbeat is a topic at which all its paths begin and end, if
---     several nodes publish it, or if a node with other outputs publishes it at most twice a
---     second. How old the data at the end of a path are counts from each root to the first arrival
---     of it or of a newer one: a message that is lost costs the time until the next one.
+-- description: The paths that an explanation may blame. Those with heartbeats
+--     (derive.heartbeat_topic) are not among them, unless there is nothing else or the caller asks
+--     for a place. How old the data at the end of a path are counts from each root to the first
+--     arrival of it or of a newer one: a message that is lost costs the time until the next one.
 -- grain: one row per printed path
--- reads: path_row, path_outcome, named_path
+-- reads: path_outcome, named_path
 -- param: place VARCHAR  Where the flows end; NULL: anywhere
 -- column: path VARCHAR [path]  The path
 -- column: steps VARCHAR[]  Its nodes, topics and services
@@ -17,57 +15,19 @@
 -- column: latency_ns BIGINT [ns]  Mean latency of those that arrived
 -- column: p95_ns BIGINT [ns]  95 % of them took no longer
 -- column: age_ns BIGINT [ns]  Mean time from a root to data at the end that are as new
-WITH topic AS (
-    SELECT
-        path_id, path, topics,
-        len(topics) = 1 AS is_single,
-        topics[1] AS topic_name,
-        string_split(path, ' → ')[1] AS node
-    FROM named_path
-    WHERE is_path
-),
--- Topics that lead nowhere else.
-leaf AS (
-    SELECT
-        topic_name,
-        count(DISTINCT node) AS nodes
-    FROM topic
-    WHERE is_single AND topic_name NOT IN (
-        SELECT name
-        FROM (SELECT unnest(topics) AS name FROM topic WHERE NOT is_single)
-        WHERE name IS NOT NULL
-    )
-    GROUP BY topic_name
-),
-span AS (
+WITH span AS (
     SELECT least(end_ns, $end_ns) - greatest(start_ns, $start_ns) AS length_ns
     FROM main.run
     WHERE list_contains($runs, run_id)
 ),
 judged AS (
     SELECT
-        t.path_id, t.path,
-        len(list_filter(
-            t.topics,
-            lambda name: regexp_full_match(
-                name, '/clock|/diagnostics|.*/_action/(status|feedback)'
-            )
-        )) > 0
-        OR coalesce(l.nodes, 0) > 1
-        OR (
-            l.nodes IS NOT NULL
-            AND e.roots <= 2e-9 * (SELECT length_ns FROM span)
-            AND t.node IN (SELECT o.node FROM topic AS o WHERE o.topic_name <> t.topic_name)
-        ) AS is_plumbing
-    FROM topic AS t
-    JOIN (
-        SELECT
-            path,
-            sum(roots) AS roots
-        FROM path_row
-        GROUP BY path
-    ) AS e ON t.path = e.path
-    LEFT JOIN leaf AS l ON t.is_single AND t.topic_name = l.topic_name
+        path_id, path,
+        list_has_any(
+            topics, (SELECT list(topic_name) FROM derive.heartbeat_topic($runs))
+        ) IS TRUE AS is_plumbing
+    FROM named_path
+    WHERE is_path
 ),
 chosen AS (
     SELECT path_id, path

@@ -4,15 +4,16 @@
 --     too, or fewer: that is shared out as the waits of the callback are. Of a queue of 1 only the
 --     age counts, since the next message replaces one that is lost.
 -- grain: one row per path, callback to blame, and callback that waits for it
--- reads: application_path, breakdown, callback_job, callback_name, callback_use, callback_wait,
---     delivery, held_message, named_path
+-- reads: application_path, breakdown, callback_name, callback_use, callback_wait, delivery,
+--     held_message, named_path
 -- column: path VARCHAR [path]  The path
 -- column: node VARCHAR  Node to blame; NULL: not known
 -- column: callback VARCHAR  What triggers its callback; NULL: not known, or not traced
 -- column: waiting_node VARCHAR  Node that waits; NULL: the callback itself is on the path
 -- column: waiting_callback VARCHAR  What triggers the callback that waits
 -- column: is_cpu BOOLEAN  Its thread was ready, and had no CPU
--- column: topic_name VARCHAR  Topic whose messages wait, or that the callback publishes
+-- column: topic_name VARCHAR  Topic or service whose messages or requests wait, or that the
+--     callback publishes
 -- column: mean_ns BIGINT [ns]  Mean over all flows of the path; of losses, over all roots
 -- column: p95_ns BIGINT [ns]  Of 100 pieces 95 take no longer
 -- column: lost BIGINT  Messages lost while it was waited for
@@ -63,13 +64,24 @@ piece AS (
     SELECT
         b.path, b.path_id, b.hop, b.part, b.node, b.what, b.p95_ns,
         b.total_ns / a.reached AS mean_ns,
-        b.part IN ('callback', 'service') AS is_run,
+        -- Also while a job waits for its thread, which earlier ones have.
+        b.part IN ('callback', 'service') OR j.callback IS NOT NULL AS is_run,
         b.part IN (
             'network_or_idle', 'undecided', 'executor_busy', 'until_arrival', 'run_queue',
             'executor', 'take_to_callback'
         ) AS is_wait
     FROM breakdown AS b
     JOIN application_path AS a ON b.path = a.path
+    LEFT JOIN (SELECT DISTINCT node, callback FROM callback_name WHERE is_job) AS j
+        ON b.node = j.node AND b.what = j.callback
+),
+-- What takes requests on a path.
+server AS (
+    SELECT DISTINCT s.service_name, n.node, n.callback
+    FROM main.service AS s
+    JOIN main.callback AS c ON s.service_id = c.service_id
+    JOIN callback_name AS n ON c.callback_id = n.callback_id
+    WHERE list_contains($runs, s.run_id)
 ),
 waiting AS (
     SELECT
@@ -84,6 +96,15 @@ waiting AS (
     -- A node that polls takes messages when it wants to.
     WHERE p.is_wait AND r.is_comparable AND NOT r.is_polled
     GROUP BY p.path, r.node, r.callback, r.topic_name
+    UNION ALL
+    SELECT
+        p.path, s.node, s.callback, s.service_name,
+        sum(p.mean_ns),
+        max(p.p95_ns)
+    FROM piece AS p
+    JOIN server AS s ON p.node = s.node AND p.what = s.callback
+    WHERE p.is_wait
+    GROUP BY p.path, s.node, s.callback, s.service_name
 ),
 failed AS (
     SELECT
@@ -144,10 +165,7 @@ SELECT
     NULL::BIGINT AS lost,
     NULL::BIGINT AS published
 FROM piece AS p
-LEFT JOIN hop AS h ON p.path_id = h.path_id AND p.hop = h.hop
-LEFT JOIN callback_job AS j
-    ON p.node = j.node AND p.what = j.callback AND h.topic_name = j.topic_name
-LEFT JOIN callback_use AS u ON p.node = u.node AND coalesce(j.job, p.what) = u.callback
+LEFT JOIN callback_use AS u ON p.node = u.node AND p.what = u.callback
 WHERE p.is_run
 GROUP BY p.path, p.node, p.what, u.callback
 UNION ALL

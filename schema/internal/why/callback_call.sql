@@ -1,9 +1,8 @@
 -- title: Services that callbacks wait for
 -- description: Calls of services for whose response a callback waits, or which a coroutine awaits.
 --     Releases before Kilted record no requests. Then a callback waits for a service if its process
---     has a client of it, and nearly all that the service did happened in the callback. Of several
---     services the one that takes longest stands for all.
--- grain: one row per node and callback
+--     has a client of it, and nearly all that the service did happened in the callback.
+-- grain: one row per node, callback and service
 -- reads: callback_name, callback_use
 -- when: main.client WHERE NOT is_internal
 -- column: node VARCHAR  Node that waits
@@ -18,6 +17,7 @@
 -- column: long_calls BIGINT  So many calls are so long; NULL: all are alike
 -- column: calls BIGINT  All calls
 -- column: share DOUBLE  Share of all calls in the time that the callback takes, 0 to 1
+-- column: total_ns BIGINT [ns]  All calls together
 -- column: is_awaited BOOLEAN  A coroutine awaits it
 -- column: is_recorded BOOLEAN  Requests show it; else that its callback ran within this one
 WITH within AS (
@@ -68,8 +68,10 @@ named AS (
     SELECT
         n.node, n.callback, c.service_name, c.call_ns, c.is_awaited, c.is_recorded,
         coalesce(s.node, c.server, 'a server that is not recorded') AS server,
-        s.callback AS server_callback,
-        s.function AS server_function,
+        coalesce(s.callback, g.callback) AS server_callback,
+        -- A goal is accepted by another function than the one that executes it.
+        CASE WHEN NOT ends_with(c.service_name, '/_action/send_goal')
+            THEN coalesce(s.function, g.function) END AS server_function,
         quantile_disc(c.call_ns, 0.5) OVER (
             PARTITION BY n.node, n.callback, c.service_name
         ) AS usual_ns
@@ -78,6 +80,12 @@ named AS (
     JOIN callback_name AS n ON i.callback_id = n.callback_id
     LEFT JOIN main.callback_instance AS j ON c.server_instance_id = j.callback_instance_id
     LEFT JOIN callback_name AS s ON j.callback_id = s.callback_id
+    -- The result of an action is that of its execution.
+    LEFT JOIN (SELECT DISTINCT node, callback, function FROM callback_name) AS g
+        ON c.server = g.node
+        AND g.callback = printf(
+            'Action(%s)', regexp_replace(c.service_name, '/_action/get_result$', '')
+        )
     WHERE i.start_ns >= $start_ns AND i.start_ns < $end_ns
 ),
 measured AS (
@@ -90,7 +98,7 @@ measured AS (
         bool_and(is_recorded) AS is_recorded,
         any_value(usual_ns) AS usual_ns,
         count(*) AS calls,
-        sum(call_ns) AS total_ns,
+        sum(call_ns)::BIGINT AS total_ns,
         sum(call_ns) FILTER (WHERE is_awaited) AS awaited_ns,
         quantile_disc(call_ns, 0.95) AS p95_ns,
         count(*) FILTER (WHERE call_ns > 3 * usual_ns) AS long_calls,
@@ -106,9 +114,6 @@ SELECT
     m.calls,
     sum(m.total_ns) OVER (PARTITION BY m.node, m.callback)
     / greatest(u.mean_ns * u.instances + coalesce(m.awaited_ns, 0), 1) AS share,
-    m.is_awaited, m.is_recorded
+    m.total_ns, m.is_awaited, m.is_recorded
 FROM measured AS m
 JOIN callback_use AS u ON m.node = u.node AND m.callback = u.callback
-QUALIFY row_number() OVER (
-    PARTITION BY m.node, m.callback ORDER BY m.total_ns DESC, m.service_name
-) = 1

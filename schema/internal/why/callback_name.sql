@@ -8,6 +8,7 @@
 -- column: function VARCHAR  Its function, without its module; NULL: not known
 -- column: source VARCHAR  File and line at which the function begins; NULL: not known
 -- column: process_id BIGINT  Its process
+-- column: is_job BOOLEAN  It is a job
 WITH begun AS (
     SELECT
         s.callback_id,
@@ -57,7 +58,8 @@ SELECT
             lambda name, _: regexp_replace(name, '\([^()]*\)|<[^<>]*>', '', 'g')
         )), '')
     END AS function,
-    f.source, c.process_id
+    f.source, c.process_id,
+    coalesce(b.is_job, false) AS is_job
 FROM main.callback AS c
 LEFT JOIN begun AS b ON c.callback_id = b.callback_id
 JOIN named AS f

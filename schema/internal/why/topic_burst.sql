@@ -8,6 +8,7 @@
 -- column: function VARCHAR  Its function
 -- column: size BIGINT  Messages of the largest burst
 -- column: period_ns BIGINT [ns]  Median time from one burst to the next
+-- column: is_one_root BOOLEAN  One run of the callback sends all of it
 WITH message AS (
     SELECT
         p.topic_name, p.publisher_id, b.publication_id, b.start_ns,
@@ -59,11 +60,22 @@ topic AS (
 SELECT
     t.topic_name,
     main.node_label(n.full_name, r.name, r.pid) AS node,
-    k.callback, k.function, t.size, t.period_ns
+    k.callback, k.function, t.size, t.period_ns,
+    coalesce(t.size <= o.number, false) AS is_one_root
 FROM topic AS t
 JOIN main.publisher AS p ON t.publisher_id = p.publisher_id
 JOIN main.process AS r ON p.process_id = r.process_id
 LEFT JOIN main.node AS n ON p.node_id = n.node_id
 LEFT JOIN main.link_causal AS c ON t.publication_id = c.publication_id AND c.kind = 'direct'
+LEFT JOIN (
+    SELECT
+        l.callback_instance_id, b.publisher_id,
+        count(*) AS number
+    FROM main.link_causal AS l
+    JOIN main.publication AS b ON l.publication_id = b.publication_id
+    WHERE list_contains($runs, l.run_id) AND l.kind = 'direct'
+    GROUP BY l.callback_instance_id, b.publisher_id
+) AS o
+    ON c.callback_instance_id = o.callback_instance_id AND t.publisher_id = o.publisher_id
 LEFT JOIN main.callback_instance AS i ON c.callback_instance_id = i.callback_instance_id
 LEFT JOIN callback_name AS k ON i.callback_id = k.callback_id

@@ -4,7 +4,7 @@
 --     path are on average, of those that are lost until the next ones. If nothing stands out, one
 --     row says what takes most of the slowest path.
 -- grain: one row per culprit
--- reads: application_path, breakdown, callback_name, culprit
+-- reads: application_path, breakdown, callback_name, culprit, noticed
 -- column: rank BIGINT  Place, from 1; NULL: nothing stands out
 -- column: kind VARCHAR  What it does: the file of `schema/culprit`; NULL: nothing stands out
 -- column: node VARCHAR  Node; of a kind that concerns two, the one that takes the message, or waits
@@ -53,6 +53,7 @@ chosen AS (
         ) ELSE '' END AS at_times,
         coalesce(topic_name, '?') AS topic
     FROM numbered AS c
+    CROSS JOIN noticed AS l
     WHERE NOT EXISTS (
         FROM numbered AS o
         WHERE o.number < c.number AND list_has_any(
@@ -62,8 +63,13 @@ chosen AS (
                     ELSE list_filter(c.claims, lambda claim: NOT ends_with(claim, ' waits'))
                 END
             )
-            -- What is not known is explained by what does at least as much harm.
-            AND (c.kind <> 'waits' OR o.harm_ns >= c.harm_ns)
+            -- What is not known is explained by what does at least as much harm, or, where nothing
+            -- tells whether there was a CPU, ten times as much.
+            AND (
+                c.kind <> 'waits' OR o.kind = 'waits'
+                OR o.harm_ns * CASE WHEN c.lacks = 'samples' AND c.p95_ns >= l.late_ns
+                    THEN l.of_path ELSE 1 END >= c.harm_ns
+            )
     )
 ),
 said AS (
@@ -109,8 +115,11 @@ said AS (
                 '%s waits while another thread of its process computes, for %.0f %% of %s%s',
                 long_name, 100 * share, run, at_times
             )
-            WHEN 'sleeps'
-                THEN printf('%s sleeps for %.0f %% of %s%s', long_name, 100 * share, run, at_times)
+            WHEN 'sleeps' THEN printf(
+                '%s %s for %.0f %% of %s%s', long_name,
+                CASE WHEN is_supposed THEN 'sleeps or waits' ELSE 'sleeps' END, 100 * share, run,
+                at_times
+            )
             WHEN 'disk' THEN printf(
                 '%s waits for the disk, for %.0f %% of %s%s', long_name, 100 * share, run, at_times
             )
@@ -175,7 +184,10 @@ said AS (
                 THEN printf('%d of %d messages on %s were lost on the way', lost, published, topic)
             WHEN 'waits' THEN CASE
                 WHEN p95_ns > 0 THEN printf(
-                    'messages on %s wait %s (p95)%s', topic, main.duration_text(p95_ns),
+                    '%s %s wait %s (p95)%s',
+                    CASE WHEN regexp_matches(callback, '^(Service|Action)') THEN 'requests to'
+                        ELSE 'messages on' END,
+                    topic, main.duration_text(p95_ns),
                     CASE WHEN is_supposed THEN ' for the next one: its executor is not woken'
                         WHEN count IS NULL THEN '' ELSE ' while its executor spins' END
                 )
@@ -242,8 +254,12 @@ said AS (
                             ),
                             CASE
                                 WHEN is_held THEN printf('messages on %s come when it ends', topic)
+                                WHEN kind = 'burst' THEN printf(
+                                    '%s of %s takes one after the other', waiting_callback,
+                                    waiting_node
+                                )
                                 WHEN waiting_callback IS NOT NULL THEN printf(
-                                    '%s of %s waits for it', waiting_callback, waiting_node
+                                    'it keeps %s of %s waiting', waiting_callback, waiting_node
                                 )
                             END,
                             CASE WHEN lost > 0 AND kind NOT IN (
@@ -276,7 +292,7 @@ said AS (
 ),
 longest AS (
     SELECT
-        a.path, a.p95_ns, b.part, b.what, b.node,
+        a.path, a.p95_ns, a.reached, b.part, b.what, b.node,
         b.p95_ns AS longest_ns
     FROM application_path AS a
     JOIN breakdown AS b ON a.path = b.path
@@ -315,25 +331,31 @@ SELECT
     'nothing stands out',
     list_filter(
         [
+            -- Of so few, 95 % are all.
             printf(
-                '95 %% of the data on the slowest path arrive within %s',
+                '%s the slowest path arrive within %s',
+                CASE WHEN l.reached < 20 THEN printf('all %d flows of', l.reached)
+                    ELSE '95 % of the data on' END,
                 main.duration_text(l.p95_ns)
             ),
-            CASE
-                WHEN l.node = 'between nodes' THEN printf(
-                    'the way on %s takes longest: %s (p95)', l.what,
-                    main.duration_text(l.longest_ns)
-                )
-                -- Without a traced callback its topic is what it publishes.
-                WHEN l.part = 'callback' AND starts_with(l.what, '/') THEN printf(
-                    '%s takes longest, between its input and %s: %s (p95)', l.node, l.what,
-                    main.duration_text(l.longest_ns)
-                )
-                ELSE printf(
-                    '%s of %s takes longest: %s (p95)', l.what, l.node,
-                    main.duration_text(l.longest_ns)
-                )
-            END
+            printf(
+                CASE
+                    WHEN l.part = 'response_to_take' THEN '%2$s waits longest for an answer'
+                    WHEN l.part IN ('publish', 'intra', 'rclcpp', 'rcl', 'rmw', 'dds')
+                        THEN '%2$s takes longest to publish on %1$s'
+                    -- Without a traced callback its topic is what it publishes.
+                    WHEN l.part = 'callback' AND starts_with(l.what, '/')
+                        THEN '%2$s takes longest, between its input and %1$s'
+                    WHEN l.part IN ('callback', 'service') THEN '%1$s of %2$s takes longest'
+                    WHEN l.node = 'between nodes' AND NOT starts_with(l.what, '/')
+                        THEN 'it takes longest until a request to %1$s is taken'
+                    WHEN l.node = 'between nodes' OR starts_with(l.what, '/')
+                        THEN 'it takes longest until %1$s is taken'
+                    ELSE 'it takes longest until %1$s of %2$s begins'
+                END || ': %3$s (%4$s)',
+                l.what, l.node, main.duration_text(l.longest_ns),
+                CASE WHEN l.reached < 20 THEN 'at most' ELSE 'p95' END
+            )
         ],
         lambda line: line IS NOT NULL
     ),
