@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack, overload
 
 from msgflow.errors import QueryError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from msgflow.paths.paths_file import NamedPath, PathsFile
     from msgflow.query.compare import Comparison
     from msgflow.query.flow import Start
+    from msgflow.query.moment import Moment
     from msgflow.query.why import Explanation
     from msgflow.result.query_result import QueryResult
     from msgflow.sql.header import Header
@@ -484,26 +485,44 @@ class Database:
 
         return self._ask(ask)
 
-    def why(self, place: str | None = None, **part: Unpack[SliceWords]) -> Explanation:
+    @overload
+    def why(
+        self, place: str | None = None, *, at: None = None, **part: Unpack[SliceWords]
+    ) -> Explanation: ...
+
+    @overload
+    def why(
+        self, place: str | None = None, *, at: str | int, **part: Unpack[SliceWords]
+    ) -> Moment: ...
+
+    def why(
+        self, place: str | None = None, *, at: str | int | None = None, **part: Unpack[SliceWords]
+    ) -> Explanation | Moment:
         """Explain why a topic is late: who is to blame, where the time goes, what to ask next.
 
         The first path is that of the worst culprit, or the slowest: all other sections are about
         it. Each section but the verdict and the doubts, which are findings, is part of a named
         query, with the same numbers: e2e-latency, path-breakdown, critical-path, waits --by pair,
-        and topics --measure delivery.
+        and topics --measure delivery. With `at` it explains a moment: what changed around it, what
+        began and ran then, which paths were slow.
 
         Args:
             place: topic or node where the flows end; a glob is possible. By default all ends.
+            at: a moment to explain: an offset from the run's start such as '8s', epoch ns, or ISO
+                time.
             **part: what to read, see `msgflow.Slice`; one run.
 
         Raises:
             UsageError: not exactly one run, or no such place or time.
             NoFlowError: no flow arrives there.
         """
+        from msgflow.query.moment import explain_moment
         from msgflow.query.why import explain
 
         one = self._ask(Slice(part.get("run")).one_run, "an explanation")
         times = Slice(one.run_id, part.get("start"), part.get("end"))
+        if at is not None:
+            return self._ask(explain_moment, one, times, at, place)
         return self._ask(explain, one, times, place)
 
     def flow(

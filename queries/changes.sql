@@ -1,25 +1,28 @@
 -- title: What changed during a run, and when
 -- description: Latency of paths, durations and CPU times of callbacks, periods of timers and
---     topics, waits and losses of messages: steps from one level to another, trends, pauses, and
---     what stops or begins. Each with what else changed or began within the same second. The time
---     until the nodes have started is left out, and so are the windows at both ends: 1 of 16 of the
---     run.
+--     topics, waits, queues and losses of messages, CPU use of programs: steps from one level to
+--     another, trends, pauses, bursts, and what stops or begins. Each with what else changed or
+--     began within the same second. The time until the nodes have started is left out, and so are
+--     the windows at both ends: 1 of 16 of the run.
 -- grain: one row per change
 -- reads: path_outcome, named_path
 -- param: from, to, from_event, to_event, max_depth, max_paths
 -- column: run_id
 -- column: at_ns BIGINT [epoch ns]  When; of a trend its begin
 -- column: kind VARCHAR              'step', 'trend', 'stop' (silent until the end), 'begin' (silent
---     before) or 'gap' (silent for much longer than usual, the first of several)
+--     before), 'gap' (silent for much longer than usual, the first of several) or 'burst' (far more
+--     than usual, likewise)
 -- column: what VARCHAR              What changed: 'latency' of a path, 'duration' or 'CPU time' of
---     a callback, the period of a 'timer' or 'topic', 'wait' of messages, or their 'loss'
+--     a callback, the period of a 'timer' or 'topic', or of the 'take' of a subscription, 'wait' of
+--     messages, the 'queue' in which they wait, their 'loss', or 'CPU use' of a program
 -- column: node VARCHAR [node]       Node; empty: several, on a path
--- column: subject VARCHAR           The path, callback or topic
+-- column: subject VARCHAR           The path, callback, topic or program
 -- column: before DOUBLE             Median before, and the period of what stops: [ns], of 'loss' a
---     share
+--     share, of 'queue' messages, of 'CPU use' CPUs
 -- column: after DOUBLE              Median after; of 'stop', 'begin' and 'gap' the longest silence
 -- column: change VARCHAR            Both, as people say it
--- column: count BIGINT              Pauses, or messages and calls that are missing in the silence
+-- column: count BIGINT              Pauses, or messages and calls that are missing in the silence,
+--     or that a burst has more
 -- column: certainty DOUBLE [share]  Windows on their side of the middle between before and after;
 --     of a trend, by how much more pairs of windows go its way than the other
 -- column: low DOUBLE                Trends: with 90 %, the slope is at least so much, per second
@@ -32,7 +35,7 @@
 -- column: since VARCHAR             What began or happened within the same second, and fits best
 -- column: others VARCHAR[]          What else did, the nearest in time first
 -- brief: at_ns, kind, what, node, subject, change, since, follows, count,
---     meanwhile_callback, meanwhile_node, certainty
+--     meanwhile_callback, meanwhile_node, certainty, others, meanwhile_share
 -- note: callbacks
 CREATE OR REPLACE TEMP TABLE series AS
 FROM main.series($runs);
@@ -41,7 +44,10 @@ CREATE OR REPLACE TEMP TABLE settled AS
 FROM main.settled($runs, $start_ns, $end_ns);
 
 CREATE OR REPLACE TEMP TABLE series_value AS
-FROM main.series_value($runs, 'series', 'path_outcome');
+SELECT v.run_id, v.what, v.series_id, v.at_ns, v.value
+FROM main.series_value($runs, 'series', 'path_outcome') AS v
+JOIN settled AS s ON v.run_id = s.run_id
+WHERE v.at_ns >= s.start_ns AND v.at_ns < s.end_ns;
 
 CREATE OR REPLACE TEMP TABLE series_window AS
 FROM main.series_window('series_value', 'settled');
@@ -49,7 +55,7 @@ FROM main.series_window('series_value', 'settled');
 CREATE OR REPLACE TEMP TABLE change_step AS
 FROM main.value_step('series_window');
 
--- How many of the windows around the moment are on their side. Of losses few are of any size.
+-- How many of the windows around the moment are on their side.
 CREATE OR REPLACE TEMP TABLE clear_step AS
 SELECT
     c.*,
@@ -64,7 +70,7 @@ JOIN series_window AS w
     AND c.series_id = w.series_id
     AND abs(w.at_ns - c.at_ns) < (s.end_ns - s.start_ns) // 8
 GROUP BY ALL
-HAVING c.what = 'loss' OR certainty > 0.85;
+HAVING certainty > 0.85;
 
 CREATE OR REPLACE TEMP TABLE change_found AS
 WITH trend AS (FROM main.value_trend('series_window'))
@@ -86,7 +92,14 @@ FROM clear_step AS s
 WHERE NOT EXISTS (FROM trend AS t WHERE t.what = s.what AND t.series_id = s.series_id)
 UNION ALL
 SELECT run_id, kind, what, series_id, at_ns, usual, longest_ns, count, NULL, NULL, NULL, times
-FROM main.value_pause($runs, 'series_value', 'settled');
+FROM main.value_pause($runs, 'series_value', 'settled')
+UNION ALL
+SELECT
+    run_id, 'burst', what, series_id, at_ns, usual, shortest_ns, count, NULL, NULL, NULL, NULL
+FROM main.value_burst('series_value')
+UNION ALL
+SELECT run_id, 'step', 'loss', series_id, at_ns, before, after, NULL, NULL, NULL, NULL, NULL
+FROM main.loss_step('series_value');
 
 CREATE OR REPLACE TEMP TABLE change_named AS
 WITH node_topic AS (
@@ -102,7 +115,7 @@ SELECT
     c.*,
     s.node,
     coalesce(s.subject, p.path) AS subject,
-    s.process_id, o.host_id, s.topic_name,
+    s.process_id, s.host_id, s.topic_name,
     CASE WHEN c.what = 'latency' THEN string_split(p.path, ' → ') ELSE [s.node] END AS nodes,
     CASE
         WHEN c.what = 'latency' THEN p.topics
@@ -110,7 +123,8 @@ SELECT
         WHEN s.topic_name IS NULL THEN []
         ELSE [s.topic_name]
     END AS takes,
-    CASE WHEN c.what IN ('duration', 'CPU time', 'timer', 'topic') THEN n.gives ELSE [] END AS gives
+    CASE WHEN c.what IN ('duration', 'CPU time', 'timer', 'topic', 'take') THEN n.gives ELSE [] END
+    AS gives
 FROM change_found AS c
 LEFT JOIN (FROM series WHERE object_id = series_id) AS s
     ON c.what <> 'latency'
@@ -118,11 +132,28 @@ LEFT JOIN (FROM series WHERE object_id = series_id) AS s
     AND s.owner = CASE
         WHEN c.what IN ('duration', 'CPU time', 'timer') THEN 'callback'
         WHEN c.what = 'topic' THEN 'publisher'
+        WHEN c.what = 'CPU use' THEN 'program'
         ELSE 'subscription'
     END
 LEFT JOIN named_path AS p ON c.what = 'latency' AND c.series_id = p.path_id
-LEFT JOIN main.process AS o ON s.process_id = o.process_id
 LEFT JOIN node_topic AS n ON s.run_id = n.run_id AND s.node = n.node;
+
+CREATE OR REPLACE TEMP TABLE change_occasion AS
+SELECT
+    c.change_id, o.sentence,
+    abs(o.at_ns - c.at_ns) AS apart_ns,
+    len(o.nodes) = 0 AND contains(o.sentence, ' CPU') AS is_load,
+    CASE
+        WHEN list_has_any(o.nodes, c.nodes) THEN 1
+        WHEN list_has_any(o.topics, list_concat(c.takes, c.gives)) THEN 2
+        WHEN len(o.nodes) = 0 AND (o.host_id IS NULL OR o.host_id = c.host_id) THEN 3
+        ELSE 4
+    END AS place
+FROM change_named AS c
+JOIN main.occasion($runs, 'series') AS o
+    ON c.run_id = o.run_id
+    AND o.at_ns BETWEEN c.at_ns - 1_000_000_000 AND c.at_ns + 1_000_000_000
+WHERE c.kind <> 'trend';
 
 -- A change that explains another one: it comes with it, or before it in the chain.
 CREATE OR REPLACE TEMP TABLE change_cause AS
@@ -132,6 +163,7 @@ SELECT
         x.change_id,
         (
             CASE
+                WHEN l.change_id IS NOT NULL AND x.process_id <> c.process_id THEN 4
                 WHEN x.what = 'duration' THEN 0
                 WHEN x.what = 'timer' THEN 1
                 WHEN x.what = 'topic' THEN 2
@@ -145,34 +177,72 @@ JOIN change_named AS x
     ON c.run_id = x.run_id
     AND c.change_id <> x.change_id
     AND (c.kind = 'trend') = (x.kind = 'trend')
-    AND (
+-- A program that takes the CPU makes others wait, sooner or later.
+LEFT JOIN (SELECT DISTINCT change_id FROM change_occasion WHERE is_load) AS l
+    ON x.change_id = l.change_id AND x.what = 'duration' AND x.host_id = c.host_id
+-- What ends, or begins, with its node explains nothing else of it.
+ANTI JOIN (FROM change_occasion WHERE place = 1) AS e
+    ON x.change_id = e.change_id AND x.what = 'take'
+WHERE (
         c.kind = 'trend'
-        -- A queue needs time to grow, and losses are noticed now and then.
+        -- A queue of ten messages at 10 Hz needs 10 s to fill if a tenth too many come, and losses
+        -- are noticed now and then.
         OR x.at_ns BETWEEN
             c.at_ns - CASE
-                WHEN x.what = 'loss' THEN c.at_ns
-                WHEN c.what IN ('wait', 'latency', 'loss') THEN 3_000_000_000
+                WHEN x.what = 'loss' OR l.change_id IS NOT NULL THEN c.at_ns
+                WHEN c.what IN ('wait', 'queue', 'latency', 'loss') THEN 10_000_000_000
                 ELSE 1_000_000_000
             END
             AND c.at_ns + 1_000_000_000
     )
-    AND CASE c.what
-        WHEN 'latency' THEN
-            x.what IN ('duration', 'wait', 'timer', 'topic') AND list_contains(c.nodes, x.node)
-        WHEN 'CPU time' THEN x.what = 'duration' AND x.series_id = c.series_id
-        WHEN 'wait' THEN
-            (x.what = 'duration' AND x.process_id = c.process_id)
-            OR (x.what = 'duration' AND list_contains(x.gives, c.topic_name))
-            OR (x.what = 'topic' AND x.topic_name = c.topic_name)
-        WHEN 'loss' THEN
-            (x.what = 'duration' AND x.process_id = c.process_id)
-            OR (x.what = 'topic' AND x.topic_name = c.topic_name)
-        WHEN 'topic' THEN
-            (x.what IN ('duration', 'timer') AND x.node = c.node)
-            OR (x.what IN ('topic', 'loss') AND list_contains(c.takes, x.topic_name))
-        WHEN 'timer' THEN x.what = 'duration' AND x.process_id = c.process_id
-    END
+    AND (
+        (l.change_id IS NOT NULL AND c.what IN ('wait', 'queue', 'loss', 'take', 'topic', 'timer'))
+        OR CASE c.what
+            WHEN 'duration' THEN
+                x.what = 'CPU use'
+                AND x.host_id = c.host_id
+                AND x.process_id IS DISTINCT FROM c.process_id
+                AND x.after > x.before
+                AND c.after > c.before
+            WHEN 'CPU use' THEN
+                x.what IN ('duration', 'timer', 'topic', 'take') AND x.process_id = c.process_id
+            WHEN 'latency' THEN
+                x.what IN ('duration', 'wait', 'timer', 'topic') AND list_contains(c.nodes, x.node)
+            WHEN 'CPU time' THEN x.what = 'duration' AND x.series_id = c.series_id
+            WHEN 'topic' THEN
+                -- What keeps a node from taking for a while keeps it from publishing as well.
+                (
+                    (x.what IN ('duration', 'timer') OR (x.what = 'take' AND x.kind <> 'gap'))
+                    AND x.node = c.node
+                )
+                OR (x.what IN ('topic', 'loss') AND list_contains(c.takes, x.topic_name))
+            WHEN 'timer' THEN x.what = 'duration' AND x.process_id = c.process_id
+            -- Of a subscription: 'wait', 'queue', 'take', 'loss'.
+            ELSE
+                (x.what = 'duration' AND x.process_id = c.process_id)
+                OR (x.what = 'topic' AND x.topic_name = c.topic_name)
+                OR CASE c.what
+                    WHEN 'wait' THEN x.what = 'duration' AND list_contains(x.gives, c.topic_name)
+                    WHEN 'queue' THEN x.what = 'wait' AND x.series_id = c.series_id
+                    WHEN 'take' THEN x.what = 'loss' AND x.series_id = c.series_id
+                END
+        END
+    )
 GROUP BY c.change_id;
+
+-- Where changes explain each other in a circle, the earliest has no cause.
+CREATE OR REPLACE TEMP TABLE change_first AS
+WITH RECURSIVE behind (change_id, cause_id) AS (
+    SELECT change_id, cause_id FROM change_cause
+    UNION
+    SELECT b.change_id, c.cause_id
+    FROM behind AS b
+    JOIN change_cause AS c ON b.cause_id = c.change_id
+)
+SELECT change_id
+FROM behind
+GROUP BY change_id
+HAVING min(cause_id) = change_id;
 
 -- Which callback of the process ran for half of the time of the pauses, or more.
 CREATE OR REPLACE TEMP TABLE change_beside AS
@@ -200,22 +270,6 @@ JOIN main.callback_label AS l ON b.alike_id = l.callback_id
 WHERE b.share >= 0.5 AND NOT l.is_internal
 QUALIFY row_number() OVER (PARTITION BY b.id ORDER BY b.share DESC, b.alike_id) = 1;
 
-CREATE OR REPLACE TEMP TABLE change_occasion AS
-SELECT
-    c.change_id, o.sentence,
-    abs(o.at_ns - c.at_ns) AS apart_ns,
-    CASE
-        WHEN list_has_any(o.nodes, c.nodes) THEN 1
-        WHEN list_has_any(o.topics, list_concat(c.takes, c.gives)) THEN 2
-        WHEN len(o.nodes) = 0 AND (o.host_id IS NULL OR o.host_id = c.host_id) THEN 3
-        ELSE 4
-    END AS place
-FROM change_named AS c
-JOIN main.occasion($runs, 'series') AS o
-    ON c.run_id = o.run_id
-    AND o.at_ns BETWEEN c.at_ns - 1_000_000_000 AND c.at_ns + 1_000_000_000
-WHERE c.kind <> 'trend';
-
 WITH best AS (
     SELECT
         change_id,
@@ -228,6 +282,8 @@ SELECT
     c.run_id, c.at_ns, c.kind, c.what, c.node, c.subject, c.before, c.after,
     CASE
         WHEN c.what = 'loss' THEN printf('%.0f → %.0f %%', 100 * c.before, 100 * c.after)
+        WHEN c.what = 'queue' THEN printf('%.0f → %.0f messages', c.before, c.after)
+        WHEN c.what = 'CPU use' THEN printf('%.2f → %.2f CPUs', c.before, c.after)
         ELSE main.duration_text(c.before::BIGINT) || ' → ' || main.duration_text(c.after::BIGINT)
     END AS change,
     c.count,
@@ -239,7 +295,8 @@ SELECT
     b.since,
     list_filter(b.sentences, lambda each: each IS DISTINCT FROM b.since) AS others
 FROM change_named AS c
-LEFT JOIN change_cause AS f ON c.change_id = f.change_id
+LEFT JOIN (FROM change_cause ANTI JOIN change_first USING (change_id)) AS f
+    ON c.change_id = f.change_id
 LEFT JOIN change_named AS x ON f.cause_id = x.change_id
 LEFT JOIN best AS b ON c.change_id = b.change_id
 LEFT JOIN change_beside AS d ON c.change_id = d.change_id

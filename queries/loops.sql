@@ -3,7 +3,9 @@
 --     loops with a Rate or spin_once. A round is from one message of the topic that a thread
 --     publishes most on to the next. It is overrun if it takes a fifth longer than most rounds.
 --     What ran meanwhile are callbacks of the same process, on whatever thread: they may hold a
---     lock, the interpreter, or the thread itself. Rounds with a gap of the trace are left out.
+--     lock, the interpreter, or the thread itself; and with a kernel trace what had the CPU for
+--     which the thread waited. Rounds with a gap of the trace are left out, and so are threads that
+--     messages drive: they take one before most of what they publish.
 -- grain: one row per thread
 -- column: run_id
 -- column: node VARCHAR [node]       Node that publishes
@@ -44,7 +46,14 @@ traced AS (
     )
 ),
 published AS (
-    SELECT b.run_id, b.thread_id, b.publisher_id, b.start_ns, b.end_ns, b.is_loss_affected
+    SELECT
+        b.run_id, b.thread_id, b.publisher_id, b.start_ns, b.end_ns, b.is_loss_affected,
+        b.publication_id IN (
+            SELECT publication_id
+            FROM main.link_causal
+            WHERE list_contains($runs, run_id) AND kind IN ('take_adjacent', 'queue')
+                AND candidate_count = 1
+        ) AS is_driven
     FROM main.publication AS b
     JOIN main.publisher AS p ON b.publisher_id = p.publisher_id
     ASOF LEFT JOIN run AS r ON b.thread_id = r.thread_id AND b.start_ns >= r.start_ns
@@ -59,6 +68,7 @@ marked AS (
         *,
         publisher_id = mode(publisher_id) OVER (PARTITION BY thread_id) AS is_round
     FROM published
+    QUALIFY avg(is_driven::INTEGER) OVER (PARTITION BY thread_id) <= 0.5
 ),
 numbered AS (
     SELECT
@@ -117,21 +127,43 @@ WITH overrun AS (
     JOIN main.thread AS h ON r.thread_id = h.thread_id
     WHERE r.is_overrun
 ),
+-- Callbacks, and what had the CPU for which the thread waited.
 beside AS (
-    FROM main.callback_beside('overrun')
-    WHERE share >= 0.1
-    QUALIFY row_number() OVER (PARTITION BY id ORDER BY share DESC, alike_id) <= 3
+    SELECT
+        b.id,
+        l.node || ' ' || l.label AS what,
+        b.share
+    FROM main.callback_beside('overrun') AS b
+    JOIN main.callback_label AS l ON b.alike_id = l.callback_id
+    UNION ALL
+    SELECT
+        o.id,
+        coalesce(x.program, h.name, 'nothing') || ' on its CPU',
+        sum(least(p.end_ns, o.end_ns) - greatest(p.start_ns, o.start_ns)) / any_value(o.total_ns)
+    FROM (
+        SELECT
+            *,
+            sum(end_ns - start_ns) OVER (PARTITION BY id) AS total_ns
+        FROM overrun
+    ) AS o
+    JOIN main.preemptor AS p
+        ON o.id = p.thread_id AND p.start_ns < o.end_ns AND p.end_ns > o.start_ns
+    LEFT JOIN main.other_thread AS x ON p.preemptor_other_thread_id = x.other_thread_id
+    LEFT JOIN main.thread AS h ON p.preemptor_thread_id = h.thread_id
+    WHERE $has_kernel
+    GROUP BY o.id, coalesce(x.program, h.name, 'nothing')
 ),
 meanwhile AS (
     SELECT
-        b.id AS thread_id,
-        string_agg(
-            printf('%s %s %.0f %%', l.node, l.label, 100 * b.share),
-            ', ' ORDER BY b.share DESC, b.alike_id
-        ) AS shares
-    FROM beside AS b
-    JOIN main.callback_label AS l ON b.alike_id = l.callback_id
-    GROUP BY b.id
+        id AS thread_id,
+        string_agg(printf('%s %.0f %%', what, 100 * share), ', ' ORDER BY share DESC, what)
+            AS shares
+    FROM (
+        FROM beside
+        WHERE share >= 0.1
+        QUALIFY row_number() OVER (PARTITION BY id ORDER BY share DESC, what) <= 3
+    )
+    GROUP BY id
 ),
 measured AS (
     SELECT

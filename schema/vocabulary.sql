@@ -42,7 +42,8 @@
 -- param: runs BIGINT[]  Runs to look at
 -- param: seed BIGINT = 0  Random seed
 -- param: series VARCHAR  Name of a table with the rows of main.series
--- param: series_values VARCHAR  Name of a table with the rows of main.series_value
+-- param: series_values VARCHAR  Name of a table with the rows of main.series_value that lie in the
+--     times of main.settled
 -- param: settled VARCHAR  Name of a table with the rows of main.settled
 -- param: sink_take_id BIGINT = NULL  Only flows that end with this take
 -- param: skip_first DOUBLE = 0.0  Skip the first seconds of each run

@@ -3,19 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from random import Random
 
-from msgflow_sim.entity import MILLISECOND, SECOND, Publisher, Subscription, Timer, Work
+from msgflow_sim.entity import (
+    MILLISECOND,
+    SECOND,
+    ActionClient,
+    ActionServer,
+    Call,
+    Client,
+    Publisher,
+    SendGoal,
+    Service,
+    Subscription,
+    Timer,
+    Work,
+)
 from msgflow_sim.recording import Recording
 from msgflow_sim.system import Host, KernelTrace, Load, Node, Process, Scenario
 
 SIZED = ("slower", "faster", "for_a_while", "growing", "slower_timer")
 """Kinds of changes that are larger or smaller."""
-KINDS = (*SIZED, "stopped", "ended", "joined", "lossy", "hog")
+KINDS = (
+    *SIZED,
+    "stopped",
+    "ended",
+    "restarted",
+    "joined",
+    "lossy",
+    "hog",
+    "burst",
+    "overloaded",
+    "parameter",
+    "goal",
+    "service",
+)
 SIZES = (1.1, 1.2, 1.5, 2, 3, 5, 10)
+LOSSES = (0.1, 0.3, 0.3, 1)
 _STEPS = 200
 _HOG = "hog"
+_ACTION, _SERVICE, _PARAMETERS = "/work", "/reset", "/parameter_events"
 
 
 @dataclass(frozen=True)
@@ -24,7 +52,7 @@ class Planted:
 
     Attributes:
         kind: one of `KINDS`; empty: nothing changes.
-        size: how many times as long or as much.
+        size: how many times as long or as much; the share of messages that is lost.
         moments: when, since the begin of tracing [s]; none of what grows all the time.
         node: full name of the node that is to blame; empty: a program without ROS.
         occasion: what the sentence on what began has to name; empty: nothing began.
@@ -54,17 +82,29 @@ class _Member:
 def changing(kind: str, seed: int) -> tuple[Scenario, Planted]:
     """Return a system of its own for each kind and seed, and what changes in it."""
     random = Random(f"{kind} {seed}")
-    seconds = random.choice([20, 20, 30, 60])
+    seconds = random.choice([20, 20, 25, 40])
     at = int(random.uniform(0.2, 0.75) * seconds * SECOND)
     until = at + int(0.2 * seconds * SECOND)
-    size = random.choice(SIZES)
+    size = random.choice(LOSSES if kind == "lossy" else SIZES)
+    back = at + int(random.uniform(0.5, 3) * SECOND)
     host_count = 1 if kind == "hog" else random.choice([1, 1, 2])
     members = _members(random)
+    while not any(_may_change(each, kind) for each in members):
+        members = _members(random)
     target = random.choice([each for each in members if _may_change(each, kind)])
     if kind in SIZED and target.inputs:
         # Its thread keeps up with its input.
         target.work = min(target.work, 0.6 * target.period / size)
-    paces = _paces(kind, size, at, until, seconds)
+    if kind == "hog":
+        # All of it fits into two CPUs before, and into what is left behind, or not.
+        load = sum(each.work / each.period for each in members)
+        share = min(1, random.uniform(0.5, 1.4) / load)
+        for each in members:
+            each.work *= share
+    if kind in {"parameter", "goal"}:
+        target.work = min(target.work, 0.15 * target.period)
+    paces = _paces(kind, size, at, until, seconds, 1.4 * target.period / target.work)
+    ends = kind in {"ended", "restarted"}
     processes = [
         Process(
             f"process_{number}",
@@ -72,16 +112,28 @@ def changing(kind: str, seed: int) -> tuple[Scenario, Planted]:
             1000 + 20 * number,
             tuple(_node(each, random, target, kind, size, at, paces) for each in group),
             start_ns=15 * number * MILLISECOND,
-            stop_ns=at if kind == "ended" and target in group else None,
-            is_killed=kind == "ended" and target in group,
+            stop_ns=at if ends and target in group else None,
+            is_killed=ends and target in group,
         )
         for number, group in enumerate(_groups(members, target, random))
     ]
+    if kind == "restarted":
+        processes.append(replace(processes[0], pid=9000, start_ns=back, stop_ns=None))
     if kind == "joined":
         listener = Subscription(target.output, work=Work(MILLISECOND, MILLISECOND))
         processes.append(
             Process("late", "host0", 9000, (Node("late", subscriptions=(listener,)),), at)
         )
+    if kind in {"goal", "service"}:
+        once = ((at + MILLISECOND, 0),)
+        does = SendGoal(_ACTION) if kind == "goal" else Call(_SERVICE)
+        caller = Node(
+            "caller",
+            timers=(Timer(at, work=Work(), does=(does,), periods=once),),
+            clients=(Client(_SERVICE),) if kind == "service" else (),
+            action_clients=(ActionClient(_ACTION),) if kind == "goal" else (),
+        )
+        processes.append(Process("caller", "host0", 9000, (caller,)))
     loads = (Load(_HOG, 9500, 30 * MILLISECOND, 27 * MILLISECOND, 79, (0,), at),)
     faults, recording = _faults(random, seconds)
     scenario = Scenario(
@@ -99,18 +151,31 @@ def changing(kind: str, seed: int) -> tuple[Scenario, Planted]:
         ),
         processes=tuple(processes),
         duration_ns=seconds * SECOND,
-        layout=random.choice(["humble", "jazzy", "kilted"]),
+        layout="kilted" if kind == "service" else random.choice(["humble", "jazzy", "kilted"]),
         overwrites=True,
         recording=recording,
     )
-    moments = {"growing": (), "for_a_while": (at / SECOND, until / SECOND), "": ()}
+    moments = {
+        "growing": (),
+        "for_a_while": (at / SECOND, until / SECOND),
+        "restarted": (at / SECOND, back / SECOND),
+        "": (),
+    }
     node = "/" + target.name
     return scenario, Planted(
         kind,
         size,
         moments.get(kind, (at / SECOND,)),
         "" if kind == "hog" else node,
-        {"ended": node, "joined": "/late", "hog": _HOG}.get(kind, ""),
+        {
+            "ended": node,
+            "restarted": node,
+            "joined": "/late",
+            "hog": _HOG,
+            "parameter": f"a parameter of {node} was set",
+            "goal": f"a goal of {_ACTION}",
+            "service": f"{_SERVICE} was called",
+        }.get(kind, ""),
         faults,
     )
 
@@ -146,18 +211,22 @@ def _members(random: Random) -> list[_Member]:
 
 
 def _may_change(member: _Member, kind: str) -> bool:
-    if kind in {"slower_timer", "stopped"}:
+    if kind in {"slower_timer", "stopped", "burst", "service"}:
         return not member.inputs
     if kind == "joined":
         return bool(member.output) and not member.inputs
-    if kind in {"slower", "faster", "for_a_while", "growing", "lossy"}:
+    if kind == "restarted":
+        return bool(member.output)
+    if kind == "overloaded":
+        return bool(member.inputs) and not member.has_timer and member.period <= 100
+    if kind in {"slower", "faster", "for_a_while", "growing", "lossy", "parameter", "goal"}:
         # What computes less than a millisecond more is not looked at.
         return bool(member.inputs) and not member.has_timer and member.work >= 2
     return True
 
 
 def _paces(
-    kind: str, size: float, at: int, until: int, seconds: int
+    kind: str, size: float, at: int, until: int, seconds: int, overload: float
 ) -> tuple[tuple[int, float], ...]:
     if kind == "growing":
         return tuple(
@@ -169,6 +238,9 @@ def _paces(
         "faster": ((0, size), (at, 1.0)),
         "for_a_while": ((at, size), (until, 1.0)),
         "joined": ((at, 5.0),),
+        "parameter": ((at, 4.0),),
+        "goal": ((at, 4.0),),
+        "overloaded": ((at, max(2.0, overload)),),
     }.get(kind, ())
 
 
@@ -196,30 +268,49 @@ def _node(
 ) -> Node:
     is_target = member is target
     typical = int(member.work * MILLISECOND)
+    is_at_times_slow = random.random() < 0.1
     work = Work(
         typical,
         int(typical * random.choice([0.1, 0.3, 1.0])),
+        0.03 if is_at_times_slow else 0,
+        2 * typical if is_at_times_slow else 0,
         paces=paces if is_target else (),
     )
+    always_lost = 0.0 if is_target else random.choice([0.1, *[0.0] * 20])
     outputs = (member.output,) if member.output else ()
     subscriptions = tuple(
         Subscription(
             topic,
             () if member.has_timer or number else outputs,
             Work() if member.has_timer or number else work,
-            loss=0.3 if kind == "lossy" and is_target else 0,
-            loss_from_ns=at,
+            loss=size if kind == "lossy" and is_target else always_lost,
+            loss_from_ns=at if is_target else 0,
         )
         for number, topic in enumerate(member.inputs)
     )
     period = int(member.period * MILLISECOND)
-    periods = {"stopped": ((at, 0),), "slower_timer": ((at, int(size * period)),)}
-    timer = Timer(period, outputs, work, periods=periods.get(kind, ()) if is_target else ())
+    periods = {
+        "stopped": ((at, 0),),
+        "slower_timer": ((at, int(size * period)),),
+        "burst": ((at, period // 10), (at + 2 * period, period)),
+    }
+    timers = [Timer(period, outputs, work, periods=periods.get(kind, ()) if is_target else ())]
+    if not member.has_timer:
+        timers.clear()
+    topics = outputs
+    if is_target and kind == "parameter":
+        once = ((at + MILLISECOND, 0),)
+        timers.append(Timer(at, (_PARAMETERS,), Work(), periods=once))
+        topics = (*outputs, _PARAMETERS)
+    # A request that is handled keeps the timers of its node from being called.
+    handling = Work(6 * period + 300 * MILLISECOND)
     return Node(
         member.name,
-        publishers=tuple(Publisher(topic) for topic in outputs),
+        publishers=tuple(Publisher(topic) for topic in topics),
         subscriptions=subscriptions,
-        timers=(timer,) if member.has_timer else (),
+        timers=tuple(timers),
+        services=(Service(_SERVICE, work=handling),) if is_target and kind == "service" else (),
+        action_servers=(ActionServer(_ACTION),) if is_target and kind == "goal" else (),
     )
 
 

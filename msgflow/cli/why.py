@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from msgflow.cli.culprits import culprit_lines
+from msgflow.cli.moment import moment_lines
 from msgflow.cli.operation import asks
 from msgflow.cli.output import command_text, print_note, print_runs, print_status
 from msgflow.cli.sections import SectionsFormat, chosen_format, print_sections, screen_sections
@@ -18,6 +19,7 @@ from msgflow.text.values import printable
 from msgflow.text.wrapping import hanging
 
 if TYPE_CHECKING:
+    from msgflow.query.moment import Moment
     from msgflow.query.why import Explanation
     from msgflow.result.query_result import QueryResult
 
@@ -34,7 +36,7 @@ _SHOWN = {
 
 @asks(Database.why)
 def command(
-    found: Explanation,
+    found: Explanation | Moment,
     *,
     form: SectionsFormat | None = None,
     output: Path | None = None,
@@ -47,8 +49,16 @@ def command(
     Args:
         form (table|json|markdown): By default by the suffix of FILE, else table.
     """
+    from msgflow.query.why import Explanation
+
     form = chosen_format(form, output)
     print_runs([found.run])
+    if not isinstance(found, Explanation):
+        lines = partial(moment_lines, found)
+        print_sections(found.sections, form, output, None if wide else lines)
+        for step in found.steps:
+            print_status(f"next: {_command(step, part, database)}")
+        return
     brief = partial(_brief, found, lambda words: _command(words, part, database))
     print_sections(found.sections, form, output, None if wide else brief)
     if (more := len(found.paths) - _PATHS) > 0:

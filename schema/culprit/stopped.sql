@@ -1,16 +1,20 @@
--- title: A timer or a topic that stopped
+-- title: A timer, a topic or a subscription that stopped
 -- description: It is silent from some moment until the end of the run, and no other change explains
 --     that. Data at the end of the path are as old as the silence.
--- grain: one row per node and timer, or topic
+-- grain: one row per node and timer, topic or subscription
 -- reads: application_path, change
 -- next: query changes --node {node}
 SELECT
     3 AS place,
     c.node,
-    CASE WHEN c.what = 'timer' THEN c.subject END AS callback,
+    CASE c.what
+        WHEN 'timer' THEN c.subject
+        WHEN 'take' THEN printf('Subscription(%s)', c.subject)
+    END
+    AS callback,
     p.path,
-    CASE WHEN c.what = 'topic' THEN c.subject
-        ELSE p.steps[list_position(p.steps, c.node) + 1] END AS topic_name,
+    CASE WHEN c.what = 'timer' THEN p.steps[list_position(p.steps, c.node) + 1]
+        ELSE c.subject END AS topic_name,
     -- Their age grows from 0 to the silence.
     (c.after * c.after / 2 / p.length_ns)::BIGINT AS harm_ns,
     c.count AS lost,
@@ -20,8 +24,8 @@ SELECT
 FROM change AS c
 JOIN main.run AS r ON c.run_id = r.run_id
 JOIN application_path AS p
-    ON list_contains(p.steps[:-2], CASE WHEN c.what = 'topic' THEN c.subject ELSE c.node END)
-    OR (c.what = 'topic' AND p.steps[-2] = c.subject)
+    ON list_contains(p.steps[:-2], CASE WHEN c.what = 'timer' THEN c.node ELSE c.subject END)
+    OR (c.what <> 'timer' AND p.steps[-2] = c.subject)
 WHERE c.kind = 'stop' AND c.follows IS NULL
 QUALIFY row_number() OVER (
     PARTITION BY c.node, c.what, c.subject ORDER BY p.p95_ns DESC, p.path

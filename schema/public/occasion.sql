@@ -1,5 +1,5 @@
 -- description: What began, ended, or happened once, besides what is measured: nodes, their objects,
---     transitions, parameters, goals, rare requests, programs, lost events.
+--     transitions, parameters, goals, rare requests, programs, lost events, clocks that were set.
 -- grain: one row per occasion
 -- param: runs, series
 -- column: run_id
@@ -49,15 +49,6 @@ object AS (
     FROM main.publisher
     WHERE list_contains(runs, run_id) AND NOT is_internal
 ),
-program AS (
-    SELECT
-        run_id, host_id,
-        coalesce(left(regexp_replace(command, '(^| )[^ ]*/', '\1', 'g'), 40), name) AS program,
-        pid, start_ns,
-        cpu_ns / (end_ns - start_ns) AS cpus
-    FROM main.program_usage
-    WHERE list_contains(runs, run_id) AND process_id IS NULL AND NOT is_recorder
-),
 taken AS (
     SELECT
         o.run_id, o.host_id,
@@ -66,6 +57,25 @@ taken AS (
     FROM main.preemptor AS p
     JOIN main.other_thread AS o ON p.preemptor_other_thread_id = o.other_thread_id
     WHERE list_contains(runs, o.run_id) AND NOT coalesce(o.is_recorder, false)
+),
+stamped AS (
+    SELECT
+        f.run_id, f.host_id,
+        min(b.start_ns) AS at_ns,
+        min(t.source_timestamp_ns - b.start_ns) AS ahead_ns
+    FROM (SELECT DISTINCT run_id, host_id FROM main.finding WHERE name = 'clock_jumps') AS f
+    JOIN main.process AS p ON f.host_id = p.host_id
+    JOIN main.publication AS b ON p.process_id = b.process_id
+    JOIN main.link_transport AS l ON b.publication_id = l.publication_id
+    JOIN main.take AS t ON l.take_id = t.take_id
+    WHERE list_contains(runs, f.run_id) AND t.source_timestamp_ns <> 0
+    GROUP BY f.run_id, f.host_id, b.start_ns // 100_000_000
+),
+clock_step AS (
+    SELECT
+        run_id, host_id, at_ns,
+        ahead_ns - lag(ahead_ns) OVER (PARTITION BY run_id, host_id ORDER BY at_ns) AS step_ns
+    FROM stamped
 )
 SELECT
     run_id,
@@ -121,13 +131,16 @@ SELECT
     [n.full_name],
     [],
     p.host_id,
-    printf('a parameter of %s was set', n.full_name)
+    CASE WHEN u.topic_name = '/parameter_events'
+        THEN printf('a parameter of %s was set', n.full_name)
+        ELSE printf('a goal of %s began or ended', replace(u.topic_name, '/_action/status', ''))
+    END
 FROM main.publication AS b
 JOIN main.publisher AS u ON b.publisher_id = u.publisher_id
 JOIN main.node AS n ON u.node_id = n.node_id
 JOIN main.process AS p ON n.process_id = p.process_id
-WHERE list_contains(runs, b.run_id) AND u.topic_name = '/parameter_events'
-    AND b.start_ns > n.created_ns + 1_000_000_000
+WHERE list_contains(runs, b.run_id) AND b.start_ns > n.created_ns + 1_000_000_000
+    AND (u.topic_name = '/parameter_events' OR ends_with(u.topic_name, '/_action/status'))
 UNION ALL
 SELECT
     g.run_id,
@@ -163,14 +176,15 @@ QUALIFY count(*) OVER (PARTITION BY q.run_id, coalesce(v.service_name, c.service
 UNION ALL
 SELECT
     run_id,
-    min(start_ns) FILTER (cpus > 0.2),
+    min(at_ns) FILTER (cpus > 0.2),
     [],
     [],
     host_id,
-    printf('%s (pid %d) used %.1f CPUs', program, pid, max(cpus))
-FROM program
-GROUP BY run_id, host_id, program, pid
-HAVING max(cpus) > 0.2
+    program || CASE WHEN processes > 1 THEN printf(' (%d processes)', processes) ELSE '' END
+    || printf(' used %.1f CPUs', max(cpus))
+FROM main.program_use(runs)
+WHERE process_id IS NULL
+GROUP BY run_id, host_id, program, processes
 UNION ALL
 SELECT
     run_id,
@@ -193,3 +207,12 @@ SELECT
 FROM main.gap
 WHERE list_contains(runs, run_id) AND kind = 'loss'
 GROUP BY run_id, kind, start_ns // 1_000_000_000
+UNION ALL
+SELECT
+    run_id, at_ns,
+    [],
+    [],
+    host_id,
+    printf('the clock of its machine was set by %s', main.duration_text(step_ns))
+FROM clock_step
+WHERE abs(step_ns) > 100_000_000

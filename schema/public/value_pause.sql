@@ -1,10 +1,11 @@
 -- description: Timers and topics that stop until the end of the run, that begin late, or that pause
---     for much longer than they usually do. Pauses in which a trace has a gap are left out.
+--     for much longer than they usually do. Pauses in which a trace has a gap are left out, and so
+--     are those as long as chance makes them where single ones are left out now and then.
 -- grain: one row per series and kind
 -- param: runs, series_values, settled
 -- column: run_id
 -- column: kind VARCHAR  'stop', 'begin' or 'gap'
--- column: what VARCHAR  'timer' or 'topic'
+-- column: what VARCHAR  'timer', 'topic' or 'take'
 -- column: series_id
 -- column: at_ns BIGINT [epoch ns]  Begin of the first silence; of 'begin' the end of it
 -- column: usual DOUBLE  Median time from one to the next, in ns
@@ -14,17 +15,27 @@
 CREATE OR REPLACE MACRO main.value_pause(runs, series_values, settled) AS TABLE
 WITH usual AS (
     SELECT
-        v.run_id, v.what, v.series_id,
-        median(v.value) AS median_ns,
-        quantile_cont(v.value, 0.95) AS p95_ns,
-        max(v.value) AS longest_ns,
-        min(v.at_ns) AS first_ns,
-        max(v.at_ns) AS last_ns
-    FROM query_table(series_values) AS v
-    JOIN query_table(settled) AS s ON v.run_id = s.run_id
-    WHERE v.what IN ('timer', 'topic') AND v.at_ns >= s.start_ns AND v.at_ns < s.end_ns
-    GROUP BY v.run_id, v.what, v.series_id
-    HAVING count(v.value) >= 10
+        run_id, what, series_id,
+        median(value) AS median_ns,
+        quantile_cont(value, 0.95) AS p95_ns,
+        max(value) AS longest_ns,
+        count(value) AS count,
+        min(at_ns) AS first_ns,
+        max(at_ns) AS last_ns
+    FROM query_table(series_values)
+    WHERE what IN ('timer', 'topic', 'take')
+    GROUP BY run_id, what, series_id
+    HAVING count(value) >= 10
+),
+-- How often some are left out, as a share; once may be for any reason.
+omitted AS (
+    SELECT
+        u.what, u.series_id,
+        (count(*) - 1) / any_value(u.count) AS share
+    FROM usual AS u
+    JOIN query_table(series_values) AS v ON u.what = v.what AND u.series_id = v.series_id
+    WHERE v.value > 1.5 * u.median_ns AND v.value <= 2 * u.p95_ns
+    GROUP BY u.what, u.series_id
 ),
 gap AS (
     SELECT run_id, start_ns, end_ns FROM main.gap WHERE list_contains(runs, run_id)
@@ -38,8 +49,11 @@ pause AS (
     FROM query_table(series_values) AS v
     JOIN query_table(settled) AS s ON v.run_id = s.run_id
     JOIN usual AS u ON v.what = u.what AND v.series_id = u.series_id
-    WHERE from_ns >= s.start_ns AND to_ns < s.end_ns
+    LEFT JOIN omitted AS o ON v.what = o.what AND v.series_id = o.series_id
+    WHERE from_ns >= s.start_ns
         AND v.value > 2 * u.p95_ns AND v.value > u.median_ns + 50_000_000
+        -- So many in a row are left out by chance in less than one of a thousand runs.
+        AND u.count * coalesce(o.share, 0) ** (v.value / u.median_ns - 1) < 0.001
     UNION ALL
     SELECT u.run_id, u.what, u.series_id, u.median_ns, 'stop', u.last_ns, s.end_ns
     FROM usual AS u

@@ -1,8 +1,9 @@
 -- description: Moments at which values change from one level to another. The windows before each
---     moment are compared with those behind it, 8, 16 and 24 on each side: nine of ten of one side
---     exceed nine of ten of the other, the medians differ by far more than the windows of one side
---     do among themselves, and by far more than at most other moments of the series. So neither
---     what varies all the time is a change, nor what grows all the time.
+--     moment are compared with those behind it, 8, 16 and 24 on each side (of CPU use, which is
+--     sampled once a second, 4 as well): nine of ten of one side exceed nine of ten of the other,
+--     the medians differ by far more than the windows of one side do among themselves, and by far
+--     more than at most other moments of the series. So neither what varies all the time is a
+--     change, nor what grows all the time.
 -- grain: one row per change
 -- param: windows
 -- column: run_id
@@ -19,7 +20,7 @@ WITH beside AS (
         list(w.value) OVER (around ROWS BETWEEN h.width PRECEDING AND 1 PRECEDING) AS before,
         list(w.value) OVER (around ROWS BETWEEN CURRENT ROW AND h.width - 1 FOLLOWING) AS after
     FROM query_table(windows) AS w
-    CROSS JOIN (VALUES (8), (16), (24)) AS h (width)
+    JOIN (VALUES (4), (8), (16), (24)) AS h (width) ON h.width > 4 OR w.what = 'CPU use'
     WINDOW around AS (PARTITION BY w.what, w.series_id, h.width ORDER BY w.number)
 ),
 compared AS (
@@ -31,7 +32,7 @@ compared AS (
         list_aggregate(after, 'quantile_cont', [0.1, 0.9]) AS ends_after,
         sqrt(1 / len(before) + 1 / len(after)) AS scale
     FROM beside
-    WHERE len(before) >= 8 AND len(after) >= 8
+    WHERE len(before) >= least(8, width) AND len(after) >= least(8, width)
 ),
 -- Standard deviations, of normal values: from one window to the next, and of one side.
 noise AS (
@@ -69,11 +70,10 @@ SELECT
 FROM judged
 WHERE is_apart
     AND size > 8 * deviation
-    AND size > 4 * usual
-    AND CASE
-        WHEN what = 'loss' THEN size > 0.05
-        ELSE size > 1_000_000 AND greatest(before / after, after / before) >= 1.1
-    END
+    -- A minute has 60 samples of CPU use: too few to know what is usual.
+    AND (size > 4 * usual OR what = 'CPU use')
+    AND size > main.least_change(what)
+    AND greatest(before, after) >= 1.1 * least(before, after)
 WINDOW
     near AS (
         PARTITION BY what, series_id

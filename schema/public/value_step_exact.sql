@@ -1,6 +1,5 @@
 -- description: The moment of each step, to the value: of the values two windows around it, the
---     split with most of them on their side of the middle between before and after; of losses,
---     whose values are 0 or 1, with their sums.
+--     split with most of them on their side of the middle between before and after.
 -- grain: one row per step
 -- param: steps VARCHAR  Name of a table with the rows of main.value_step
 -- param: series_values, settled
@@ -17,10 +16,7 @@ WITH near AS (
         c.what, c.series_id, c.number, v.at_ns,
         sum(
             CASE WHEN c.after > c.before THEN 1 ELSE -1 END
-            * CASE
-                WHEN c.what = 'loss' THEN v.value - (c.before + c.after) / 2
-                ELSE sign(v.value - (c.before + c.after) / 2)
-            END
+            * sign(v.value - (c.before + c.after) / 2)
         )
             OVER (
                 PARTITION BY c.what, c.series_id, c.number

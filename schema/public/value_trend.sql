@@ -1,12 +1,12 @@
 -- description: Values that grow or fall all through a run: the median of the slopes between any two
---     windows (Theil and Sen), where three of four pairs go the same way, the windows lie much
---     closer to the line than to one level, and the ends of the line differ by a third or more.
+--     of 16 parts (Theil and Sen), where five of six pairs go the same way, the parts lie closer to
+--     the line than to any two levels, and the ends of the line differ by a third or more.
 -- grain: one row per series with a trend
 -- param: windows
 -- column: run_id
 -- column: what VARCHAR  As in main.series_value
 -- column: series_id
--- column: at_ns BIGINT [epoch ns]  Where the line begins
+-- column: at_ns BIGINT [epoch ns]  Where the line begins: the middle of the first part
 -- column: before DOUBLE  The line at its begin
 -- column: after DOUBLE  And at its end
 -- column: certainty DOUBLE  By how much more pairs of windows go its way than the other, as a share
@@ -16,31 +16,50 @@ WITH coarse AS (
     SELECT
         run_id, what, series_id,
         median(value) AS value,
-        min(at_ns) AS at_ns
-    FROM query_table(windows)
-    WHERE what NOT IN ('timer', 'topic', 'loss')
-    GROUP BY run_id, what, series_id, number // 4
+        median(at_ns) AS at_ns
+    FROM (
+        SELECT
+            *,
+            ntile(16) OVER (PARTITION BY what, series_id ORDER BY number) AS part
+        FROM query_table(windows)
+        WHERE what NOT IN ('timer', 'topic', 'take')
+    )
+    GROUP BY run_id, what, series_id, part
 ),
 slope AS (
     SELECT
         a.what, a.series_id,
-        min(a.at_ns) AS at_ns,
+        min(a.at_ns)::BIGINT AS at_ns,
         quantile_cont((b.value - a.value) / (b.at_ns - a.at_ns), [0.05, 0.5, 0.95]) AS slopes,
         avg(sign(b.value - a.value)) AS direction
     FROM coarse AS a
     JOIN coarse AS b ON a.what = b.what AND a.series_id = b.series_id AND a.at_ns < b.at_ns
     GROUP BY a.what, a.series_id
-    HAVING count(*) >= 45 AND abs(direction) > 0.75
+    HAVING abs(direction) > 2 / 3
 ),
 line AS (
     SELECT
         c.run_id, c.what, c.series_id, s.at_ns, s.slopes, s.direction,
-        median(c.value) AS level,
         max(c.at_ns) AS until_ns,
         median(c.value - s.slopes[2] * (c.at_ns - s.at_ns)) AS base
     FROM coarse AS c
     JOIN slope AS s ON c.what = s.what AND c.series_id = s.series_id
     GROUP BY c.run_id, c.what, c.series_id, s.at_ns, s.slopes, s.direction
+),
+-- What one step in place of the line leaves: squares of the distances from two levels.
+step AS (
+    SELECT
+        what, series_id,
+        var_pop(value) OVER before * count(*) OVER before
+        + var_pop(value) OVER behind * count(*) OVER behind AS error
+    FROM coarse
+    WINDOW
+        before AS (PARTITION BY what, series_id ORDER BY at_ns ROWS UNBOUNDED PRECEDING),
+        behind AS (
+            PARTITION BY what, series_id
+            ORDER BY at_ns
+            ROWS BETWEEN 1 FOLLOWING AND UNBOUNDED FOLLOWING
+        )
 )
 SELECT
     l.run_id, l.what, l.series_id, l.at_ns,
@@ -50,7 +69,11 @@ SELECT
     l.slopes
 FROM line AS l
 JOIN coarse AS c ON l.what = c.what AND l.series_id = c.series_id
-WHERE abs(after - l.base) > 1_000_000 AND greatest(l.base / after, after / l.base) > 1.3
+WHERE abs(after - l.base) > main.least_change(l.what)
+    AND greatest(l.base / after, after / l.base) > 1.3
 GROUP BY ALL
-HAVING median(abs(c.value - l.base - l.slopes[2] * (c.at_ns - l.at_ns)))
-    < 0.3 * median(abs(c.value - l.level))
+HAVING sum((c.value - l.base - l.slopes[2] * (c.at_ns - l.at_ns)) ** 2) < (
+    SELECT min(s.error)
+    FROM step AS s
+    WHERE s.what = l.what AND s.series_id = l.series_id
+)

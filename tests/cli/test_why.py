@@ -223,3 +223,18 @@ def test_a_place_where_no_flow_arrives(msgflow: Msgflow, small_database: Path) -
     assert "no flow arrives — /chatter" in result.stderr
     assert "hint: msgflow check" in result.stderr
     assert "no such topic or node" in msgflow("why", "/chater", "--db", small_database).stderr
+
+
+def test_a_moment_is_sentences_and_tables_that_fit(
+    demo: Path, msgflow: Msgflow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    said = msgflow("why", "/control/cmd", "--at", "0.6s", "--db", demo)
+    lines = said.stdout.splitlines()
+    assert lines[0] == "nothing changed before it, nor within a second of it"
+    assert "RAN IN THE SECOND AROUND IT" in lines
+    assert max(map(cell_len, lines)) <= 80
+    assert "next: msgflow query critical-path --start 0.1s --end 1.1s" in said.stderr
+    sections = json.loads(msgflow("why", "--at", "0.6s", "--format", "json", "--db", demo).stdout)
+    assert [*sections] == ["changes", "occasions", "callbacks", "programs", "paths"]
+    assert {row["node"] for row in sections["callbacks"]} >= {"/perception/detector"}

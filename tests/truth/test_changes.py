@@ -9,6 +9,7 @@ import pytest
 from support.ingested import ingest_one
 
 import msgflow
+from msgflow.errors import UsageError
 from msgflow_sim import (
     Host,
     Node,
@@ -26,6 +27,7 @@ from msgflow_sim.entity import MILLISECOND, SECOND
 SECONDS = 20
 # When what changes, in seconds.
 SLOWER, FASTER, CANCELLED, KILLED, LOSSY, SLOWER_TIMER = 7.3, 14.2, 6.1, 11.6, 9.4, 12.7
+BURST, OVERLOADED = 10.2, 8.3
 
 
 def system(*, changes: bool) -> Scenario:
@@ -43,10 +45,14 @@ def system(*, changes: bool) -> Scenario:
         "killed": Work(2 * MILLISECOND),
         "cancelled": Work(2 * MILLISECOND),
         "slower_timer": Work(2 * MILLISECOND),
+        "bursty": Work(MILLISECOND),
+        "overloaded": Work(9 * MILLISECOND, paces=((at(OVERLOADED), 5),)),
     }
     periods = {
         "cancelled": ((at(CANCELLED), 0),),
         "slower_timer": ((at(SLOWER_TIMER), 60 * MILLISECOND),),
+        # 12 messages in place of one.
+        "bursty": ((at(BURST), 3 * MILLISECOND), (at(BURST + 0.04), 40 * MILLISECOND)),
     }
     processes = []
     for number, (name, work) in enumerate(readers.items()):
@@ -93,15 +99,24 @@ def system(*, changes: bool) -> Scenario:
 
 
 @pytest.fixture(scope="module")
-def changed(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The database of the system in which several things change."""
+    return simulated(tmp_path_factory.mktemp("changed"), system(changes=True))
+
+
+@pytest.fixture(scope="module")
+def changed(recorded: Path) -> list[dict[str, Any]]:
     """Rows of the query, with the time since the begin of the recording [s]."""
-    return asked(tmp_path_factory.mktemp("changed"), system(changes=True))
+    return asked(recorded)
 
 
-def asked(folder: Path, scenario: Scenario) -> list[dict[str, Any]]:
+def simulated(folder: Path, scenario: Scenario) -> Path:
     simulate(scenario, folder / "trace")
-    database = folder / "run.duckdb"
-    ingest_one(folder / "trace", database)
+    ingest_one(folder / "trace", folder / "run.duckdb")
+    return folder / "run.duckdb"
+
+
+def asked(database: Path) -> list[dict[str, Any]]:
     with msgflow.open_db(database) as opened:
         rows = opened.query("changes").table.to_pylist()
         begin = opened.sql("SELECT min(start_ns) AS ns FROM run").table["ns"][0].as_py()
@@ -115,7 +130,7 @@ def rows_of(
 
 
 def test_nothing_changes_where_nothing_does(tmp_path: Path) -> None:
-    assert asked(tmp_path, system(changes=False)) == []
+    assert asked(simulated(tmp_path, system(changes=False))) == []
 
 
 def test_a_callback_that_takes_longer_for_a_while_steps_up_and_down(
@@ -176,3 +191,43 @@ def test_a_timer_gets_another_period(changed: list[dict[str, Any]]) -> None:
 
 def test_what_does_not_change_has_no_row(changed: list[dict[str, Any]]) -> None:
     assert not [row for row in changed if "/steady" in f"{row['node']} {row['subject']}"]
+
+
+def test_more_messages_than_usual_are_a_burst(changed: list[dict[str, Any]]) -> None:
+    (topic,) = rows_of(changed, "burst", "topic", "/bursty_sensor")
+    assert topic["at"] == pytest.approx(BURST, abs=0.1)
+    assert topic["change"] == "40 ms → 3 ms"
+    assert topic["count"] == pytest.approx(12, abs=2)
+    assert topic["follows"] == "timer Timer(40 ms) of /bursty_sensor"
+
+
+def test_a_queue_grows_since_its_callback_takes_longer(changed: list[dict[str, Any]]) -> None:
+    (queue,) = rows_of(changed, "step", "queue", "/overloaded")
+    assert queue["at"] > OVERLOADED
+    assert queue["after"] == pytest.approx(10, abs=1)
+    assert queue["follows"] == "duration Subscription(/overloaded) of /overloaded"
+    assert not [row for row in changed if "overloaded" in str(row["node"]) and not row["follows"]][
+        1:
+    ]
+
+
+def test_a_moment_has_what_changed_ran_and_was_slow(recorded: Path) -> None:
+    with msgflow.open_db(recorded) as opened:
+        moment = opened.why(at=f"{SLOWER + 0.3}s")
+        calm = opened.why(at="4s")
+    assert moment.headline.startswith("/slower: duration of Subscription(/slower): 5.5")
+    assert f"since {SLOWER:.1f}" in moment.headline
+    (duration, *_) = moment.sections["changes"].table.to_pylist()
+    assert (duration["what"], duration["node"]) == ("duration", "/slower")
+    ran = {row["node"]: row for row in moment.sections["callbacks"].table.to_pylist()}
+    assert ran["/slower"]["count"] == 25
+    assert ran["/slower"]["longest_ns"] > 1.5 * 5.5e6
+    silent, slow = moment.sections["paths"].table.to_pylist()
+    assert ("/cancelled " in silent["path"], silent["flows"]) == (True, 0)
+    assert "/slower " in slow["path"]
+    assert slow["median_ns"] > 1.5 * slow["usual_ns"]
+    assert moment.steps == (("query", "critical-path", "--start", "7.1s", "--end", "8.1s"),)
+    # What grows all the time does so at any moment.
+    assert "/growing" in calm.headline
+    with msgflow.open_db(recorded) as opened, pytest.raises(UsageError, match="no such moment"):
+        opened.why(at="90s")

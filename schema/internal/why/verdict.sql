@@ -233,7 +233,7 @@ said AS (
                             ) END,
                             CASE WHEN kind = 'stopped' THEN coalesce(
                                 occasion,
-                                CASE WHEN callback IS NOT NULL
+                                CASE WHEN starts_with(callback, 'Timer')
                                     THEN 'cancelled, or no executor looks at it: not known' END
                             ) END,
                             CASE WHEN kind = 'callback' THEN printf(
