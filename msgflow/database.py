@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from msgflow.query.compare import Comparison
     from msgflow.query.flow import Start
     from msgflow.query.moment import Moment
+    from msgflow.query.story import Story
     from msgflow.query.why import Explanation
     from msgflow.result.query_result import QueryResult
     from msgflow.sql.header import Header
@@ -525,6 +526,31 @@ class Database:
             return self._ask(explain_moment, one, times, at, place)
         return self._ask(explain, one, times, place)
 
+    def story(
+        self,
+        goal: str | int | None = None,
+        *,
+        request_id: int | None = None,
+        run: str | int | None = None,
+    ) -> Story:
+        """Tell what became of a goal, or of a call of a service: what took longest, and why.
+
+        Args:
+            goal: `goal_id` of the view `goal`, or its first digits.
+            request_id: in place of that, id of a request to a service.
+            run: run of the goal; any when None.
+
+        Raises:
+            UsageError: not exactly one of them, or one that does not exist.
+        """
+        from msgflow.query.story import goal_meant, read_story
+
+        if goal is not None and request_id is None:
+            request_id = self._ask(goal_meant, goal, run)
+        elif goal is not None or request_id is None:
+            raise UsageError("a story is of one goal or one request", "msgflow why --goal ID")
+        return self._ask(read_story, request_id)
+
     def flow(
         self,
         place: str | None = None,
@@ -535,6 +561,7 @@ class Database:
         callback_instance_id: int | None = None,
         request_id: int | None = None,
         response_id: int | None = None,
+        goal: str | int | None = None,
         run: str | int | None = None,
         direction: str = "both",
         depth: int = 32,
@@ -553,6 +580,7 @@ class Database:
             callback_instance_id: id of a callback instance.
             request_id: id of a request to a service.
             response_id: id of a response of a service.
+            goal: id of a goal of an action, or its first digits.
             run: a name or an id; by default the latest one, or that of the id.
             direction: 'forward' (effects), 'backward' (causes) or 'both'.
             depth: most messages in a row, each way.
@@ -563,7 +591,10 @@ class Database:
             UsageError: not exactly one start, or one that does not exist.
         """
         from msgflow.export.flow import read_flow
+        from msgflow.query.story import goal_meant
 
+        if goal is not None and request_id is None:
+            request_id, run = self._ask(goal_meant, goal, run), None
         given = (publication_id, take_id, callback_instance_id, request_id, response_id)
         start = self._ask(_start, place, given, at, run)
         return self._ask(

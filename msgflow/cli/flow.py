@@ -140,6 +140,8 @@ def _require_rows(
 ) -> None:
     """Refuse what does not go with --why, which answers with rows about one flow."""
     refused = [*tree, *(name for name in ("request", "response") if f"{name}_id" in start)]
+    if "goal" in start:
+        raise UsageError("--why is about a message", f"msgflow why --goal {start['goal']}")
     if absolute:
         refused.append("absolute")
     if refused:

@@ -109,6 +109,7 @@ def command(
     from msgflow.watch.flight_recorder import FlightRecorder
     from msgflow.watch.follow import watch_finished, watch_live
     from msgflow.watch.prometheus import Exporter
+    from msgflow.watch.silences import silence_line
     from msgflow.watch.watched_sessions import WatchedSessions, watched_place
     from msgflow.watch.watcher import Watcher
 
@@ -175,7 +176,8 @@ def command(
                     print_lines([report.to_json()])
                     continue
                 violated = (f"violation: {violation_line(each)}" for each in report.violations)
-                print_lines([window_line(report), *map(printable, violated)])
+                stopped = map(silence_line, report.stopped)
+                print_lines([window_line(report), *map(printable, [*violated, *stopped])])
 
         def live(place: Path, is_over: Callable[[], bool]) -> None:
             show(watch_live(place, watcher, step_ns=step_ns, is_over=is_over, note=print_note))

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 from msgflow.cli.culprits import culprit_lines
 from msgflow.cli.moment import moment_lines
-from msgflow.cli.operation import asks
+from msgflow.cli.operation import extends
 from msgflow.cli.output import command_text, print_note, print_runs, print_status
 from msgflow.cli.sections import SectionsFormat, chosen_format, print_sections, screen_sections
+from msgflow.cli.story import print_story
 from msgflow.database import Database
-from msgflow.files.default_files import DEFAULT_DATABASE
+from msgflow.errors import UsageError
 from msgflow.run.slice import SliceWords
 from msgflow.text.values import printable
 from msgflow.text.wrapping import hanging
@@ -34,24 +35,59 @@ _SHOWN = {
 }
 
 
-@asks(Database.why)
+@extends(Database.why)
 def command(
-    found: Explanation | Moment,
+    database: Database,
     *,
+    goal: str | None = None,
+    request: int | None = None,
     form: SectionsFormat | None = None,
     output: Path | None = None,
     wide: bool = False,
-    database: Path = DEFAULT_DATABASE,
-    **part: Unpack[SliceWords],
+    **asked: Any,
 ) -> None:
-    """The last lines are the commands to ask next.
+    """The first path is that of the worst culprit, or the slowest: all other sections are about
+    it. Each section but the verdict and the doubts, which are findings, is part of a named query,
+    with the same numbers: e2e-latency, path-breakdown, critical-path, waits --by pair, and topics
+    --measure delivery.
+
+    The last lines are the commands to ask next.
 
     Args:
+        goal (ID): What became of a goal, in place of that: goal_id of the view goal, or its first
+            digits.
+        request (ID): Likewise of the call of a service: request_id of the view request.
         form (table|json|markdown): By default by the suffix of FILE, else table.
     """
+    form = chosen_format(form, output)
+    if goal is None and request is None:
+        found = database.why(**asked)
+        # A pager may read the rest of it for long: others can write to the database meanwhile.
+        database.close()
+        asked.pop("place", None)
+        asked.pop("at", None)
+        _show(found, form, output, wide=wide, database=database.path, **asked)
+        return
+    run = asked.pop("run", None)
+    if asked:
+        raise UsageError(
+            f"a goal has a place and times of its own — {next(iter(asked))}", "leave it out"
+        )
+    story = database.story(goal, request_id=request, run=run)
+    print_story(story, form, output, database.path, wide=wide)
+
+
+def _show(
+    found: Explanation | Moment,
+    form: SectionsFormat,
+    output: Path | None,
+    *,
+    wide: bool,
+    database: Path,
+    **part: Unpack[SliceWords],
+) -> None:
     from msgflow.query.why import Explanation
 
-    form = chosen_format(form, output)
     print_runs([found.run])
     if not isinstance(found, Explanation):
         lines = partial(moment_lines, found)

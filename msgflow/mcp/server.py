@@ -32,6 +32,8 @@ from msgflow.version import __version__
 if TYPE_CHECKING:
     from mcp.server.mcpserver import MCPServer
 
+    from msgflow.query.story import Story
+    from msgflow.query.why import Explanation
     from msgflow.result.query_result import QueryResult
     from msgflow.sql.header import Header
 
@@ -202,6 +204,7 @@ class _Tools:
         publication_id: int | None = None,
         take_id: int | None = None,
         callback_instance_id: int | None = None,
+        goal: str | None = None,
         run: str | None = None,
         direction: str = "both",
         limit: int = 200,
@@ -209,7 +212,7 @@ class _Tools:
         """Follow one message: what caused it, and what it caused, as a tree.
 
         Give a topic (at: first message at or after that time, seconds from the start of the run) or
-        one of the ids. direction: 'forward', 'backward' or 'both'.
+        one of the ids. goal: goal_id of the view goal. direction: 'forward', 'backward' or 'both'.
         """
         flow = self._database.flow(
             topic,
@@ -217,6 +220,7 @@ class _Tools:
             publication_id=publication_id,
             take_id=take_id,
             callback_instance_id=callback_instance_id,
+            goal=goal,
             run=run,
             direction=direction,
             limit=_capped(limit),
@@ -234,14 +238,20 @@ class _Tools:
         run: str | None = None,
         start: str | None = None,
         end: str | None = None,
+        goal: str | None = None,
     ) -> str:
         """Explain why a topic is late: the culprits, the paths, and where their time goes.
 
         Section verdict has the culprits, the worst first: headline, evidence, and in next what to
         ask then, as words of the command line. place: topic or node where the flows end; by
-        default all ends. run, start, end: as for run_query.
+        default all ends. run, start, end: as for run_query. goal: in place of that, what became of
+        a goal of an action, and what took longest: goal_id of the view goal.
         """
-        found = self._database.why(place, run=run, start=start, end=end)
+        found: Explanation | Story = (
+            self._database.why(place, run=run, start=start, end=end)
+            if goal is None
+            else self._database.story(goal, run=run)
+        )
         rows = (
             json.dumps({"section": name} | json.loads(_with_short_cells(row)), ensure_ascii=False)
             for name, result in found.sections.items()

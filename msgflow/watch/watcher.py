@@ -22,6 +22,7 @@ from msgflow.watch.history import History
 from msgflow.watch.kept_chunk import KeptTraces, read_chunk
 from msgflow.watch.learned_answers import LearnedAnswers, with_learned
 from msgflow.watch.prometheus import Exporter
+from msgflow.watch.silences import Silences
 from msgflow.watch.window_database import WindowDatabase
 from msgflow.watch.window_report import WindowReport, report_of
 
@@ -57,6 +58,7 @@ class Watcher:
         self._late_events = 0
         self._clock_offset_ns = self._last_clock_offset_ns = _clock_offset_ns()
         self._answers = LearnedAnswers()
+        self._silences = Silences()
         # Keeps the violation of the last report, if it has one.
         self._keep: Callable[[], None] | None = None
         self._after = Continuation()
@@ -188,7 +190,11 @@ class Watcher:
         judged = Window(window.start_ns, newest_ns + 1)
         traces = history.traces(judged)
         links, learned = self._ingest(traces)
-        report = replace(report_of(self._con, window), late_events=self._late_events)
+        report = replace(
+            report_of(self._con, window),
+            late_events=self._late_events,
+            stopped=self._silences.further(self._con),
+        )
         self._late_events = 0
         if self.alarm is not None:
             found, rows = self.alarm.judge(self._con, judged, window.end_ns)
@@ -197,7 +203,7 @@ class Watcher:
             self.exporter.count(self._con, Window(history.closed_ns, window.end_ns))
         if self.database is not None:
             self.database.offer(window.end_ns, traces, links)
-        if report.violations and self.recorder is not None:
+        if (report.violations or report.stopped) and self.recorder is not None:
             kept = history.traces(judged, earlier_ns=self._earlier_ns)
             paths = history.paths(judged, earlier_ns=self._earlier_ns)
             self._keep = partial(self.recorder.keep, newest_ns, kept, paths, links, learned)

@@ -53,6 +53,8 @@ class WindowReport:
     topics: Sequence[Row] = field(default=())  # rows of `topics --measure summary`
     late_events: int = 0  # events that have come since the last window, but belong to closed ones
     violations: Sequence[Row] = field(default=())  # what is not as the targets demand
+    # Timers and topics that stopped, as `Silences.further` returns them.
+    stopped: Sequence[Row] = field(default=())
     judged: Sequence[Row] = field(default=())  # rows of `verify`, as `Alarm.judge` returns them
     # How old its last event is [s]; None of a recording that is finished.
     lag_s: float | None = None
@@ -74,6 +76,7 @@ class WindowReport:
             "discarded_events": self.discarded_events,
             "late_events": self.late_events,
             "violations": self.violations,
+            "stopped": self.stopped,
             "verdicts": self.verdicts,
         }
         return json.dumps(shown, ensure_ascii=False, default=json_value)

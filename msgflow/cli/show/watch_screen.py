@@ -16,6 +16,7 @@ from msgflow.cli.show.keys import noted_keys
 from msgflow.run.window import format_epoch
 from msgflow.text.values import NULL, count, format_duration, printable
 from msgflow.watch.alarm import violation_line
+from msgflow.watch.silences import silence_line
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -104,7 +105,8 @@ class WatchScreen:
             # Clocks that are apart make latencies negative.
             steps.append(max(path["max_ns"] or 0, 0))
         at = format_epoch(report.window.end_ns)[_TIME]
-        self._violations += [f"{at} {violation_line(each)}" for each in report.violations]
+        told = [*map(violation_line, report.violations), *map(silence_line, report.stopped)]
+        self._violations += [f"{at} {line}" for line in told]
 
     def _shown(self, report: WindowReport) -> RenderableType:
         fates = [_fates(path) for path in report.paths if path["path"] == self._picked]
