@@ -80,11 +80,13 @@ def command(
     from msgflow.clocks.clocks_file import read_clock_sync
     from msgflow.database import Database
     from msgflow.links.links_file import read_links
+    from msgflow.query.course import read_course
     from msgflow.record.perf import read_rate
     from msgflow.record.program import PYTHON_NODES
     from msgflow.record.recording import record
     from msgflow.record.session import EVENTS, Channel
     from msgflow.result.layout import screen_width
+    from msgflow.run.slice import Slice
 
     if print_python_path:
         typer.echo(PYTHON_NODES)
@@ -144,6 +146,9 @@ def command(
                 command_of = partial(_command, database)
                 whole = command_of(["why", "--wide"])
                 print_lines(culprit_lines(verdict, command_of, screen_width(), whole=whole))
+            times = Slice(name)
+            run = times.one_run(opened.connection, "a recording")
+            print_lines(read_course(opened.connection, run, times).picture())
             latencies = opened.query("e2e-latency", run=name)
             print_result(latencies)
             for sentence in part_of_latencies(opened, latencies):

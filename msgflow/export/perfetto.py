@@ -215,10 +215,11 @@ class _Writer:
     def values(self) -> int:
         count = 0
         for row in self.rows("perfetto_value"):
-            process = self.tracks["process", row["process_id"]]
-            unit = {"unit_name": row["unit"]}
+            # A program without ROS has none.
+            process = self.tracks.get(("process", row["process_id"]))
+            name, unit = row["name"], {"unit_name": row["unit"]}
             track = self.track(
-                row["kind"], row["id"], parent_uuid=process, name=row["name"], counter=unit
+                row["kind"], row["id"], name, parent_uuid=process, name=name, counter=unit
             )
             self.event(row["at_ns"], track, "COUNTER", double_counter_value=row["value"])
             count += 1

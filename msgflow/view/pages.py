@@ -16,6 +16,7 @@ from msgflow.db.finding import read_findings
 from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.compare import compare, warm_up
+from msgflow.query.course import read_course
 from msgflow.query.notes import clock_notes
 from msgflow.query.runner import Steps, bind, run_query
 from msgflow.result.query_result import QueryResult
@@ -28,7 +29,7 @@ from msgflow.trace.numpy_arrow import integers_to_arrow, texts_to_arrow
 from msgflow.view import summary
 from msgflow.view.page_query import Params, Question, Scratch, page_query, run_page_query
 from msgflow.view.sql_page import examples, words
-from msgflow.view.table_encoding import encode, encode_result
+from msgflow.view.table_encoding import encode, encode_result, escaped
 
 # Named queries that pages show, with the numbers of `msgflow query`.
 NAMED = (
@@ -47,6 +48,7 @@ MOST_LINKS = 20_000
 # Different stacks of a flame graph, those with most samples.
 MOST_STACKS = 5_000
 _KEPT_BYTES = 32 * 2**20
+_OF_SENTENCES = ["at", "what", "node", "subject", "sentence"]
 _OF_CLOCKS = ("clocks_apart", "clocks_not_together")
 
 
@@ -299,6 +301,16 @@ def critical_path(asked: Question) -> bytes:
     return encode_result(shown, meta, asked.origin_ns)
 
 
+def _course(_: Pages, asked: Question) -> bytes:
+    course = read_course(asked.connection, asked.run, asked.slice)
+    meta = {
+        "lines": escaped(course.lines.to_pylist()),
+        "sentences": escaped(course.sentences.select(_OF_SENTENCES).to_pylist()),
+        "command": _command(asked, "changes"),
+    }
+    return encode_result(course.changes, meta, asked.origin_ns)
+
+
 def _links(_: Pages, asked: Question) -> bytes:
     table = asked.links(MOST_LINKS + 1)
     is_cut = table.num_rows > MOST_LINKS
@@ -326,6 +338,7 @@ ANSWERS: dict[str, Callable[[Pages, Question], bytes]] = {
     "stack": _stack,
     "compare": _compare,
     "segments": Pages._segments,
+    "course": _course,
     "links": _links,
     "flow": _flow,
     "warm_up": _warm_up,
@@ -338,6 +351,7 @@ _PLAIN = (
     "row", "gap", "path", "executor_share", "executor_node", "neighbour", "rate", "callback",
     "callback_point", "callback_slowest", "topic_point", "topic_slowest", "service_point",
     "service_slowest", "loss", "loss_point", "thread_name", "place", "run_before", "program_share",
+    "mark", "counter",
 )  # fmt: skip
 # Named queries that list one by one what a page query counts.
 _LISTED_BY = {"loss": "topics-unmatched"}

@@ -21,6 +21,7 @@ from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
 from msgflow.query.compare import Comparison
 from msgflow.query.compare import compare as compare_runs
+from msgflow.query.course import read_course
 from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import Run
 from msgflow.run.slice import Slice
@@ -152,9 +153,10 @@ class _Maker:
             self.parts[f"query?name={name}"] = content
         for name in (
             "row", "gap", "path", "executor_node", "executor_share", "callback", "loss",
-            "loss_point", "thread_name", "program_share",
+            "loss_point", "thread_name", "program_share", "mark", "counter", "course",
         ):  # fmt: skip
             self.keep(name)
+        self.keep("counter", rates=1)
         self.keep_panels()
         chosen = self.keep_paths()
         if self.other is not None and self.comparison is not None:
@@ -182,7 +184,9 @@ class _Maker:
             f"msgflow {row['msgflow_version']}",
         ]
         findings = read_findings(self.asked.connection, [run.run_id])
-        return markdown(run, facts, self.notes, findings, self.sections())
+        course = read_course(self.asked.connection, run, self.asked.slice)
+        picture = list(course.picture())
+        return markdown(run, facts, self.notes, picture, findings, self.sections())
 
     def look_at_window(self) -> None:
         """Raise if nothing is in the window; note that it is not the whole run."""

@@ -233,6 +233,7 @@ def markdown(
     run: Run,
     facts: Sequence[str],
     notes: Sequence[str],
+    picture: Sequence[str],
     findings: Sequence[Finding],
     sections: Sequence[Section],
 ) -> str:
@@ -243,6 +244,7 @@ def markdown(
         lines += _section(section)
         # What makes data late comes first; why the numbers may be wrong stands before them.
         if section.name == "why":
+            lines += _picture(run, picture)
             lines += _findings(run, findings)
     return "\n".join(lines)
 
@@ -305,6 +307,16 @@ def _flows(section: Section) -> Iterator[str]:
             share = format_cell(node["share"], unit="share")
             yield f"  - {code(format_cell(node['node']))} {took}, {share} of it"
     yield ""
+
+
+def _picture(run: Run, picture: Sequence[str]) -> Iterator[str]:
+    """Yield the change that explains most, as text that is drawn."""
+    if picture:
+        yield from ("## When it changed", "", *code_lines(picture), "")
+        yield from (
+            *code_lines([shell_joined(["msgflow", "query", "changes", "--run", run.name])]),
+            "",
+        )
 
 
 def _findings(run: Run, findings: Sequence[Finding]) -> Iterator[str]:

@@ -80,7 +80,7 @@ def _column(column: pa.Array, origin: int) -> tuple[dict[str, Any], bytes]:
         return _text(column)
     if pa.types.is_map(kind):
         return _text(texts_to_arrow([_map_text(value) for value in column.to_pylist()]))
-    texts = json.dumps(_shown(column.to_pylist()), ensure_ascii=False, default=str)
+    texts = json.dumps(escaped(column.to_pylist()), ensure_ascii=False, default=str)
     return {"type": "json"}, texts.encode()
 
 
@@ -88,13 +88,14 @@ def _map_text(value: Any) -> str | None:
     return None if value is None else format_cell(value)
 
 
-def _shown(value: Any) -> Any:
+def escaped(value: Any) -> Any:
+    """Return what JSON holds with its control characters escaped."""
     if isinstance(value, str):
         return printable(value, keep="\n")
     if isinstance(value, list):
-        return [_shown(part) for part in value]
+        return [escaped(part) for part in value]
     if isinstance(value, dict):
-        return {_shown(name): _shown(part) for name, part in value.items()}
+        return {escaped(name): escaped(part) for name, part in value.items()}
     return value
 
 
@@ -120,7 +121,7 @@ def _integers(
 
 def _text(column: pa.Array) -> tuple[dict[str, Any], bytes]:
     encoded = column.dictionary_encode()
-    words = json.dumps(_shown(encoded.dictionary.to_pylist()), ensure_ascii=False).encode()
+    words = json.dumps(escaped(encoded.dictionary.to_pylist()), ensure_ascii=False).encode()
     # 0 means NULL.
     codes = np.where(is_valid(encoded.indices), to_numpy(encoded.indices).astype(np.int64) + 1, 0)
     head, body = _integers(codes, np.zeros(len(codes), np.bool_))

@@ -12,7 +12,7 @@ from msgflow.errors import UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
-from msgflow.sql.statement import registered
+from msgflow.sql.statement import internal_sql, registered
 from msgflow.watch.window_report import discarded_events
 
 if TYPE_CHECKING:
@@ -64,6 +64,8 @@ class Exporter:
         self._losses: Counter[tuple[str, ...]] = Counter()
         self._violations: Counter[tuple[str, ...]] = Counter()
         self._discarded = 0
+        # Of the last part: kind, node or host, topic or program, value.
+        self._counters: list[tuple[str, str, str, float]] = []
         self._last: WindowReport | None = None
         self._shown_s = 0.0
 
@@ -99,6 +101,9 @@ class Exporter:
         losses = con.execute(_LOSSES, part.bindings).fetchall()
         with registered(con, watched_flow=flows):
             paths = con.execute(_PATHS, {"bounds": list(BOUNDS_S)}).fetchall()
+        runs = [run.run_id for run in Slice("all").runs(con)]
+        values = {"runs": runs, **part.bindings}
+        counters = internal_sql().run(con, "watched_counter", values).fetchall()
         discarded = discarded_events(con, part)
         with self._lock:
             for path, statuses, total_ns, number, buckets in paths:
@@ -109,6 +114,7 @@ class Exporter:
             for *labels, number in losses:
                 self._losses[tuple(labels)] = self._losses.pop(tuple(labels), 0) + number
             self._discarded += discarded
+            self._counters = counters[:MOST_LABELS]
             self._forget()
 
     def _forget(self) -> None:
@@ -188,3 +194,16 @@ class Exporter:
             lag.add_metric([], self._last.lag_s + time.monotonic() - self._shown_s)
         yield busy
         yield lag
+        for kind, name, meaning, labels in (
+            ("rate", "msgflow_topic_rate_hertz", "Messages in a second", ["node", "topic"]),
+            (
+                "queue", "msgflow_queue_messages", "Most messages that waited to be taken",
+                ["subscriber", "topic"],
+            ),
+            ("cpu", "msgflow_program_cpus", "CPUs that a program used", ["host", "program"]),
+        ):  # fmt: skip
+            gauge = GaugeMetricFamily(name, meaning, labels=labels)
+            for of, owner, what, value in self._counters:
+                if of == kind:
+                    gauge.add_metric([owner or "", what], value)
+            yield gauge

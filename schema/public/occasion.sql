@@ -3,6 +3,8 @@
 -- grain: one row per occasion
 -- param: runs, series
 -- column: run_id
+-- column: kind VARCHAR  'node', 'restart', 'object', 'state', 'parameter', 'goal', 'request',
+--     'program', 'loss' or 'clock'
 -- column: at_ns BIGINT [epoch ns]  When it happened
 -- column: nodes VARCHAR[]  Nodes that it is of
 -- column: topics VARCHAR[]  Topics that it is about
@@ -79,15 +81,22 @@ clock_step AS (
 )
 SELECT
     run_id,
+    CASE WHEN is_again THEN 'restart' ELSE 'node' END AS kind,
     created_ns AS at_ns,
     [node] AS nodes,
     topics, host_id,
-    printf('%s began', node) AS sentence
-FROM life
+    printf('%s began%s', node, CASE WHEN is_again THEN ' again' ELSE '' END) AS sentence
+FROM (
+    SELECT
+        *,
+        lag(last_seen_ns) OVER (PARTITION BY run_id, node ORDER BY created_ns) < created_ns
+            AS is_again
+    FROM life
+)
 WHERE created_ns > start_ns + 1_000_000_000
 UNION ALL
 SELECT
-    run_id, last_seen_ns,
+    run_id, 'node', last_seen_ns,
     [node],
     topics, host_id,
     printf('%s is not seen any more', node)
@@ -105,7 +114,7 @@ WHERE l.last_seen_ns < l.end_ns - 1_000_000_000
     )
 UNION ALL
 SELECT
-    n.run_id, o.created_ns,
+    n.run_id, 'object', o.created_ns,
     [n.full_name],
     [o.topic_name],
     p.host_id,
@@ -116,7 +125,7 @@ JOIN main.process AS p ON n.process_id = p.process_id
 WHERE o.created_ns > n.created_ns + 1_000_000_000
 UNION ALL
 SELECT
-    t.run_id, t.at_ns,
+    t.run_id, 'state', t.at_ns,
     [n.full_name],
     [],
     p.host_id,
@@ -127,7 +136,9 @@ JOIN main.process AS p ON n.process_id = p.process_id
 WHERE list_contains(runs, t.run_id)
 UNION ALL
 SELECT
-    b.run_id, b.start_ns,
+    b.run_id,
+    CASE WHEN u.topic_name = '/parameter_events' THEN 'parameter' ELSE 'goal' END,
+    b.start_ns,
     [n.full_name],
     [],
     p.host_id,
@@ -143,7 +154,7 @@ WHERE list_contains(runs, b.run_id) AND b.start_ns > n.created_ns + 1_000_000_00
     AND (u.topic_name = '/parameter_events' OR ends_with(u.topic_name, '/_action/status'))
 UNION ALL
 SELECT
-    g.run_id,
+    g.run_id, 'goal',
     coalesce(g.sent_ns, g.taken_ns),
     list_filter([m.full_name, n.full_name], lambda name: name IS NOT NULL),
     [],
@@ -157,7 +168,7 @@ LEFT JOIN main.node AS m ON c.node_id = m.node_id
 WHERE list_contains(runs, g.run_id)
 UNION ALL
 SELECT
-    q.run_id,
+    q.run_id, 'request',
     coalesce(q.sent_ns, q.taken_ns),
     list_filter([m.full_name, n.full_name], lambda name: name IS NOT NULL),
     [],
@@ -175,7 +186,7 @@ WHERE list_contains(runs, q.run_id)
 QUALIFY count(*) OVER (PARTITION BY q.run_id, coalesce(v.service_name, c.service_name)) <= 5
 UNION ALL
 SELECT
-    run_id,
+    run_id, 'program',
     min(at_ns) FILTER (cpus > 0.2),
     [],
     [],
@@ -187,7 +198,7 @@ WHERE process_id IS NULL
 GROUP BY run_id, host_id, program, processes
 UNION ALL
 SELECT
-    run_id,
+    run_id, 'program',
     min(start_ns),
     [],
     [],
@@ -198,7 +209,7 @@ GROUP BY run_id, host_id, program
 HAVING sum(end_ns - start_ns) > 20_000_000
 UNION ALL
 SELECT
-    run_id,
+    run_id, 'loss',
     min(start_ns),
     [],
     [],
@@ -209,7 +220,7 @@ WHERE list_contains(runs, run_id) AND kind = 'loss'
 GROUP BY run_id, kind, start_ns // 1_000_000_000
 UNION ALL
 SELECT
-    run_id, at_ns,
+    run_id, 'clock', at_ns,
     [],
     [],
     host_id,

@@ -292,12 +292,14 @@ def test_counters_have_rates_and_queues(exported: Exported) -> None:
                 "SELECT start_ns FROM publication WHERE publisher_id = ? ORDER BY 1", [publisher]
             ).fetchall()
         ]
+        # Each holds until the next message, and none comes after the last.
         rates.append(
             [
-                (time, pytest.approx(1e9 / (time - before)))
-                for before, time in pairwise(times)
-                if time > before
+                (time, pytest.approx(1e9 / (following - time)))
+                for time, following in pairwise(times)
+                if following > time
             ]
+            + [(time, 0) for time in times[-1:]]
         )
     values = {
         unit: [

@@ -291,7 +291,7 @@ def test_the_first_page_of_a_report_has_it(
     drops = page.page.get_by_role("region", name="What was dropped or lost, and why")
     assert drops.locator("tbody tr").count() == len(section(dropping, "drops").result)
     # What makes data late comes first, and each finding is a line.
-    assert [page.page.locator("h2").all_inner_texts()[at] for at in (0, 2)] == [
+    assert [page.page.locator("h2").all_inner_texts()[at] for at in (0, 3)] == [
         "What makes data late, or lets them get lost",
         "What is wrong with the recording",
     ]

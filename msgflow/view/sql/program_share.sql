@@ -7,27 +7,9 @@
 -- column: start_at, length
 -- column: busy BIGINT [ns]  CPU time, the sum over CPUs
 WITH used AS (
-    SELECT
-        u.host_id,
-        coalesce(l.nodes, u.name, '?') AS program,
-        u.start_ns, u.end_ns, u.cpu_ns
-    FROM main.program_usage AS u
-    LEFT JOIN main.process_label AS l ON u.process_id = l.process_id
-    WHERE u.run_id = $run AND u.start_ns < $end_ns AND u.end_ns > $start_ns
-    UNION ALL
-    SELECT
-        c.host_id,
-        coalesce(l.nodes, c.name, '?'),
-        greatest(c.start_ns, r.start_ns),
-        least(c.start_ns + 1_000_000_000, r.end_ns),
-        c.running_ns
-    FROM main.cpu_usage AS c
-    JOIN main.run AS r ON c.run_id = r.run_id
-    LEFT JOIN main.thread AS t ON c.thread_id = t.thread_id
-    LEFT JOIN main.process_label AS l ON t.process_id = l.process_id
-    WHERE c.run_id = $run AND c.tid <> 0
-        AND c.start_ns < least($end_ns, r.end_ns) AND c.start_ns + 1_000_000_000 > $start_ns
-        AND NOT EXISTS (FROM main.program_usage WHERE run_id = $run)
+    SELECT host_id, program, start_ns, end_ns, cpu_ns
+    FROM main.program_cpu([$run])
+    WHERE start_ns < $end_ns AND end_ns > $start_ns
 ),
 ranked AS (
     SELECT

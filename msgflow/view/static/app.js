@@ -15,6 +15,8 @@ import { ComparePage } from "./compare.js";
 import { SqlPage } from "./sql.js";
 import { Follower } from "./follower.js";
 import { failed, waiting } from "./notice.js";
+import { Course } from "./course.js";
+import { happened } from "./marks.js";
 
 const PAGES = {
   overview: ["Overview", OverviewPage],
@@ -185,6 +187,15 @@ class App {
 
   query(name, params = {}) {
     return this.inWindow("query", { name, internal: this.internal ? 1 : null, ...params });
+  }
+
+  // When the run changed, and what happened in it: several parts of a page ask for them.
+  async course() {
+    return new Course(this, await this.inWindow("course"));
+  }
+
+  happened() {
+    return happened(this);
   }
 
   header() {

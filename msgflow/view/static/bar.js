@@ -4,12 +4,14 @@ import { breakable, clear, color, h } from "./dom.js";
 import { current, go, pageAddress } from "./address.js";
 import { duration, momentOf, secondsText, usualMost } from "./labels.js";
 import { INTERNAL } from "./notice.js";
+import { NEAR_MARK, nearestMark } from "./marks.js";
 
 // A shorter drag on the curve is a click.
 const LEAST_DRAG = 4;
 const MOST_FOUND = 8;
 // Pages whose numbers are of whole runs, or of what a query says.
 const WITHOUT_WINDOW = ["compare", "sql"];
+const HOW_TO_CHOOSE = "drag to choose a window of time; a click shows the whole run";
 const FOUND_ON = {
   node: ["nodes", "q"],
   namespace: ["nodes", "q"],
@@ -24,7 +26,7 @@ export class Bar {
       className: "rate",
       role: "img",
       "aria-label": "how much happened over time: drag to choose a window of time",
-      title: "drag to choose a window of time; a click shows the whole run",
+      title: HOW_TO_CHOOSE,
     });
     const edge = (label) =>
       h("input", {
@@ -108,7 +110,11 @@ export class Bar {
       this.drag = { x: event.clientX, from: at(event), to: at(event) };
     });
     this.canvas.addEventListener("pointermove", (event) => {
-      if (!this.drag) return;
+      if (!this.drag) {
+        const near = (NEAR_MARK / this.canvas.clientWidth) * this.app.run.length;
+        this.canvas.title = nearestMark(this.marks, at(event), near)?.text ?? HOW_TO_CHOOSE;
+        return;
+      }
       this.drag.to = at(event);
       this.draw();
     });
@@ -143,9 +149,14 @@ export class Bar {
     if (this.run !== app.run) {
       this.run = app.run;
       this.rate = this.places = null;
+      this.marks = [];
       clear(this.said);
       app.fetch("rate").then((rate) => {
         this.rate = rate;
+        this.draw();
+        return app.happened();
+      }).then((marks) => {
+        this.marks = marks;
         this.draw();
       }).catch((error) => clear(this.said, error.message));
     }
@@ -228,6 +239,10 @@ export class Bar {
         Math.max((rate.length[row] / whole) * box.width, 1),
         high,
       );
+    }
+    for (const mark of this.marks) {
+      context.fillStyle = color(mark.color);
+      context.fillRect((mark.at / whole) * box.width - 1, 0, 2, 7);
     }
     if (chosen.start <= 0 && chosen.end >= whole) return;
     context.strokeStyle = color("focus");

@@ -2,6 +2,7 @@
 
 import { color, h } from "./dom.js";
 import { duration } from "./labels.js";
+import { NEAR_MARK, nearestMark } from "./marks.js";
 import { downloads } from "./download.js";
 
 const drawn = new Set();
@@ -9,14 +10,20 @@ const drawn = new Set();
 // Series: {label, color, values, width, points, fill, paths, stepped, isJoined (over
 // what is missing)}; x: numbers.
 // Options: height, xFormat, yFormat, title, onClick(index), xLabel, yLabel, legend (false: none),
-// xAxis (more of what uPlot takes for the axis), xName (of the first column of its CSV).
+// xAxis (more of what uPlot takes for the axis), xName (of the first column of its CSV), marks (of
+// an axis of time: what happened, or a promise of it).
 export function chart(x, series, options = {}) {
   const frame = h("div", {
     className: "chart",
     role: "img",
     "aria-label": options.title ?? "chart",
   });
-  const place = { frame, plot: null };
+  const place = { frame, plot: null, marks: [] };
+  const said = h("div", { className: "chart-said soft", role: "status" });
+  Promise.resolve(options.marks ?? []).then((marks) => {
+    place.marks = marks;
+    place.plot?.redraw(false);
+  });
   const draw = () => {
     place.plot?.destroy();
     frame.replaceChildren();
@@ -47,6 +54,7 @@ export function chart(x, series, options = {}) {
           axis(options.xFormat ?? String, options.xLabel, 44, options.xAxis),
           axis(options.yFormat ?? duration, options.yLabel, 74),
         ],
+        hooks: { draw: [(plot) => drawMarks(plot, place.marks)] },
         series: [
           {},
           ...series.map((one) => ({
@@ -75,6 +83,14 @@ export function chart(x, series, options = {}) {
       [x, ...series.map((one) => one.values)],
       frame,
     );
+    if (options.marks) {
+      place.plot.over.addEventListener("pointermove", (event) => {
+        const [at, beside] = [0, NEAR_MARK].map((by) =>
+          place.plot.posToVal(event.offsetX + by, "x")
+        );
+        said.textContent = nearestMark(place.marks, at, beside - at)?.text ?? "";
+      });
+    }
     if (options.onClick) {
       place.plot.over.addEventListener("click", () => {
         const at = place.plot.cursor.idx;
@@ -90,6 +106,7 @@ export function chart(x, series, options = {}) {
     "div",
     { className: "chart-frame" },
     frame,
+    options.marks && said,
     downloads({
       name: options.title ?? "chart",
       canvases: () => [...frame.querySelectorAll("canvas")],
@@ -101,6 +118,30 @@ export function chart(x, series, options = {}) {
 // How an axis of counts is written: nothing stands between two whole numbers.
 export function counted(value) {
   return Number.isInteger(value) ? value.toLocaleString("en-US") : "";
+}
+
+// A line for each change, and a triangle on the axis for whatever else happened.
+function drawMarks(plot, marks) {
+  const { ctx: c, bbox: { left, top, width, height } } = plot;
+  const ratio = devicePixelRatio || 1;
+  c.save();
+  for (const { at, color: name, isChange } of marks) {
+    const x = plot.valToPos(at, "x", true);
+    if (x < left || x > left + width) continue;
+    c.fillStyle = color(name);
+    if (isChange) c.fillRect(x - ratio, top, 2 * ratio, height);
+    else {
+      c.globalAlpha = 0.3;
+      c.fillRect(x, top, ratio, height);
+      c.globalAlpha = 1;
+      c.beginPath();
+      c.moveTo(x - 4 * ratio, top);
+      c.lineTo(x + 4 * ratio, top);
+      c.lineTo(x, top + 6 * ratio);
+      c.fill();
+    }
+  }
+  c.restore();
 }
 
 function alpha(text, share) {

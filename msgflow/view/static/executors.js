@@ -84,6 +84,7 @@ export class Executors {
           yFormat: (value) => String(Math.round(value * 100) / 100),
           yLabel: "CPUs",
           legend: true,
+          marks: this.app.happened(),
           onClick: (at) => {
             location.hash = pageAddress("timeline", {
               from: Math.max(0, Math.round(times[at])),
@@ -101,6 +102,11 @@ export class Executors {
       app.query("executor-usage"),
       app.inWindow("executor_share"),
     ]);
+    this.marks = [];
+    app.happened().then((marks) => {
+      this.marks = marks;
+      this.draw();
+    });
     if (!usage.rows) return null;
     this.strips = { shares, places: [] };
     const { extent } = app;
@@ -293,6 +299,10 @@ export class Executors {
           context.fillRect(x, box.height - below - high, width, high);
           filled.set(shares.start_at[row], below + high);
         }
+      }
+      for (const mark of this.marks) {
+        context.fillStyle = color(mark.color);
+        context.fillRect(((mark.at - start) / whole) * box.width - 1, 0, 2, 6);
       }
       canvas.onclick = (event) => {
         const at = start + (event.offsetX / box.width) * whole;

@@ -150,6 +150,7 @@ function course(app, points, isShown) {
       xFormat: momentAxis,
       yFormat: counted,
       xName: "begin [ns since begin of run]",
+      marks: app.happened(),
       onClick: (at) => {
         location.hash = pageAddress("timeline", { from: times[at], to: times[at] + width });
       },

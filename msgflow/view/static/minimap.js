@@ -11,6 +11,7 @@ export class Minimap {
     this.length = length;
     this.move = move;
     this.shares = null;
+    this.marks = [];
     this.view = { from: 0, to: length };
     this.canvas = h("canvas", {
       className: "minimap",
@@ -80,6 +81,10 @@ export class Minimap {
       );
     }
     const x = (at) => Math.min(Math.max((at / this.length) * width, 0), width);
+    for (const mark of this.marks) {
+      c.fillStyle = color(mark.color);
+      c.fillRect(x(mark.at) - 1, 0, 2, 7);
+    }
     const [left, right] = [x(view.from), Math.max(x(view.to), x(view.from) + 2)];
     c.fillStyle = color("focus");
     c.globalAlpha = 0.18;

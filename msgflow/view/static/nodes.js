@@ -6,6 +6,7 @@ import { besides, dataTable, filled } from "./table.js";
 import { redrawCharts } from "./chart.js";
 import { commands, notes } from "./notice.js";
 import { callbackPanel, Chooser, searchField } from "./panel.js";
+import { courseColumn, OF_CALLBACK } from "./course.js";
 import { Sections } from "./sections.js";
 import { timers } from "./timers.js";
 import { actions, services } from "./services.js";
@@ -50,11 +51,7 @@ export class NodesPage {
       nothing: "No callback was recorded.",
       texts: (table, row) => [table.node[row], table.callback[row], table.symbol[row]],
       panel: (table, row) =>
-        callbackPanel(
-          app,
-          table.callback_id[row],
-          `${table.node[row] ?? ""} ${table.callback[row]}`,
-        ),
+        callbackPanel(app, table.callback_id[row], table.node[row], table.callback[row]),
     });
     const under = h("div", {}, notes(callbacks.meta.notes), commands([callbacks]));
     const known = new Set(callbacks.node);
@@ -128,6 +125,11 @@ export class NodesPage {
     };
     add(waits, OF_WAITS, "callback_id", (id) => id);
     add(delivery, OF_DELIVERY, "subscription_id", (id) => subscription.get(id));
+    const find = (row) => [OF_CALLBACK, table.callback[row], table.node[row]];
+    courseColumn(app, table, find, () => {
+      columns.splice(2, 0, "course");
+      chooser.show(table);
+    });
     const tables = [callbacks, waits, delivery];
     clear(under, notes(tables.flatMap((one) => one.meta.notes ?? [])), commands(tables));
     chooser.show(table);

@@ -5,6 +5,7 @@ import { address } from "./address.js";
 import { count, duration, PATH_HELP, pathText, wallClock } from "./labels.js";
 import { command, doubt, doubtHelp, failed, notes, waiting } from "./notice.js";
 import { blame, summary, verdict, withoutRepeated } from "./summary.js";
+import { courseSummary } from "./course.js";
 
 export class OverviewPage {
   constructor(app, root) {
@@ -27,6 +28,7 @@ export class OverviewPage {
     )
       .map((part) => ({ part, ...section(part === "verdicts" ? "Requirements" : "What changed") }));
     const why = section("What makes data late, or lets them get lost");
+    const changed = section("When it changed");
     const wrong = section("What is wrong with the recording");
     const slow = section("The slowest paths");
     const nodes = section("Where the time of the slowest flows went");
@@ -34,7 +36,7 @@ export class OverviewPage {
     const threads = section("Busiest threads");
     clear(
       root,
-      [why, ...given, wrong].map((one) => one.root),
+      [why, ...given, changed, wrong].map((one) => one.root),
       h("section", {}, h("h2", {}, "What was recorded"), facts),
       [slow, nodes, drops, threads].map((one) => one.root),
     );
@@ -174,6 +176,10 @@ export class OverviewPage {
     // The page stands without what takes longest. A server is asked for what stands further below
     // when somebody looks there: once all above has its height. A page that follows is whole.
     const isWhole = !app.source.isServed || app.follower;
+    const courses = fill(changed, async () => {
+      if (!isWhole) await above;
+      return courseSummary(await app.course(), await app.happened());
+    });
     const below = [[nodes, "blame", blame], [drops, "drops", summary], [
       threads,
       "threads",
@@ -184,7 +190,7 @@ export class OverviewPage {
         return show(await app.inWindow("summary", { part }));
       })
     );
-    this.complete = Promise.all([verdicts, ...below]);
+    this.complete = Promise.all([verdicts, courses, ...below]);
     await (isWhole ? Promise.all([above, this.complete]) : above);
   }
 

@@ -6,6 +6,7 @@ import { duration, momentAxis } from "./labels.js";
 import { besides, dataTable } from "./table.js";
 import { chart, counted } from "./chart.js";
 import { failed, waiting } from "./notice.js";
+import { OF_CALLBACK } from "./course.js";
 
 export const onTimeline = (kind, id) => pageAddress("timeline", { flow: `${kind}:${id}` });
 
@@ -103,8 +104,8 @@ export class Chooser {
 }
 
 // Longest and median of pieces of time; a click leads to the longest. Options: title, values and
-// median (columns of points), target(row): an address.
-export function overTime(points, { title, values, median, target }) {
+// median (columns of points), target(row): an address, marks.
+export function overTime(points, { title, values, median, target, marks }) {
   const known = (column) =>
     Array.from(points[column], (value) => (value === null || Number.isNaN(value) ? null : value));
   return h(
@@ -125,6 +126,7 @@ export function overTime(points, { title, values, median, target }) {
       title,
       xFormat: momentAxis,
       xName: "begin [ns since begin of run]",
+      marks,
       onClick: (row) => {
         location.hash = target(row);
       },
@@ -143,18 +145,27 @@ export function overTime(points, { title, values, median, target }) {
 }
 
 // How many began in each piece of time. Series: {label, color, values}.
-export function ratesOverTime(points, title, series) {
+export function ratesOverTime(points, title, series, marks) {
   return h(
     "section",
     {},
     h("h3", {}, title[0].toUpperCase() + title.slice(1)),
-    h("p", { className: "soft" }, `How many in each ${duration(points.length[0])}.`),
+    h(
+      "p",
+      { className: "soft" },
+      `How many in each ${duration(points.length[0])}. A click shows that time on the timeline.`,
+    ),
     chart(Array.from(points.start_at), series.map((one) => ({ stepped: true, ...one })), {
       title,
       xFormat: momentAxis,
       yFormat: counted,
       xName: "begin [ns since begin of run]",
       legend: true,
+      marks,
+      onClick: (row) => {
+        const from = points.start_at[row];
+        location.hash = pageAddress("timeline", { from, to: from + points.length[row] });
+      },
     }),
   );
 }
@@ -185,12 +196,27 @@ export function slowestOnes(slowest, { title, values, target, columns }) {
   );
 }
 
+// Changes below a panel, when they are known; marks for its charts, of those that `isOwn` says.
+export function changesBeside(app, rowsOf, isOwn = () => true) {
+  const place = h("div");
+  const marks = Promise.all([app.course(), app.happened()]).then(([course, others]) => {
+    const rows = rowsOf(course);
+    clear(place, course.table(rows));
+    return [...others, ...course.marks(rows.filter((row) => isOwn(course.changes, row)))];
+  }).catch((error) => {
+    if (error.name !== "AbortError") clear(place, failed(error));
+    return app.happened();
+  });
+  return { place, marks };
+}
+
 // What a callback did, by its identity.
-export async function callbackPanel(app, callback, name) {
+export async function callbackPanel(app, callback, node, label) {
   const [points, slowest] = await Promise.all(
     ["callback_point", "callback_slowest"].map((query) => app.inWindow(query, { callback })),
   );
-  const head = h("h2", { className: "path-title" }, name);
+  const head = h("h2", { className: "path-title" }, `${node ?? ""} ${label}`);
+  const { place, marks } = changesBeside(app, (course) => course.of(OF_CALLBACK, label, node));
   if (!points.rows) return [head, h("p", {}, "No instance of it began in the window of time.")];
   const target = (table) => (row) =>
     onTimeline("callback_instance", table.callback_instance_id[row]);
@@ -204,13 +230,14 @@ export async function callbackPanel(app, callback, name) {
         values: "duration",
         median: "median",
         target: target(points),
+        marks,
       }),
       ratesOverTime(points, "instances over time", [{
         label: "instances",
         color: "timer",
         values: Array.from(points.count),
         fill: true,
-      }]),
+      }], marks),
       slowestOnes(slowest, {
         title: "Longest instances",
         values: "duration",
@@ -218,5 +245,6 @@ export async function callbackPanel(app, callback, name) {
         columns: ["start_at", "duration", "callback_instance_id"],
       }),
     ),
+    place,
   ];
 }

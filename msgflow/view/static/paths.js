@@ -18,9 +18,12 @@ import { command, doubt, doubtHelp, failed, notes, sqlText, waiting } from "./no
 import { chart, counted, redrawCharts } from "./chart.js";
 import { doubted, pathNumbers } from "./overview.js";
 import { pathFunctions } from "./functions.js";
+import { changesBeside } from "./panel.js";
+import { courseColumn } from "./course.js";
 
 const COLUMNS = [
   "path",
+  "course",
   "median_ns",
   "p95_ns",
   "p99_ns",
@@ -66,6 +69,7 @@ export class PathsPage {
   constructor(app, root) {
     this.app = app;
     this.root = root;
+    this.order = {};
     this.ready = this.build();
   }
 
@@ -122,6 +126,12 @@ export class PathsPage {
       this.detail,
     );
     await this.choose(row, asked !== this.ids[row]);
+    courseColumn(
+      this.app,
+      this.table,
+      (other) => [["latency"], this.table.path[other]],
+      () => this.fill(),
+    );
   }
 
   async choose(row, isNew) {
@@ -130,6 +140,16 @@ export class PathsPage {
       replace({ page: "paths", path: this.ids[row] });
       this.app.linksMoved();
     }
+    this.fill();
+    clear(this.detail, waiting("counting flows …"));
+    try {
+      clear(this.detail, await this.picture(row));
+    } catch (error) {
+      clear(this.detail, failed(error));
+    }
+  }
+
+  fill() {
     clear(
       this.list,
       dataTable(this.table, {
@@ -138,18 +158,13 @@ export class PathsPage {
         ),
         label: "paths",
         sort: { name: "p99_ns", down: true },
+        state: this.order,
         picked: (other) => other === this.row,
         doubted: this.isDoubted,
         onPick: (other) => this.choose(other, true),
         data: (other) => ({ path: String(this.ids[other]) }),
       }),
     );
-    clear(this.detail, waiting("counting flows …"));
-    try {
-      clear(this.detail, await this.picture(row));
-    } catch (error) {
-      clear(this.detail, failed(error));
-    }
   }
 
   async picture(row) {
@@ -170,6 +185,14 @@ export class PathsPage {
     pathFunctions(app, path).then((found) => clear(sampled, found))
       .catch((error) => error.name === "AbortError" || clear(sampled, failed(error)));
     const bins = this.bins = evenBins(histogram);
+    const nodes = new Set(pathText(table.path[row]).split(" → "));
+    const isOwn = (changes, at) => changes.subject[at] === table.path[row];
+    const { place, marks } = changesBeside(
+      app,
+      (course) =>
+        course.rows((at) => isOwn(course.changes, at) || nodes.has(course.changes.node[at])),
+      isOwn,
+    );
     const toFlow = (source, at) =>
       address({
         page: "timeline",
@@ -206,6 +229,7 @@ export class PathsPage {
             chart(Array.from(points.root_at), pointSeries(points), {
               xFormat: (value) => `${+(value / 1e9).toFixed(6)} s`,
               title: "latency over time",
+              marks,
               xName: "began at [ns since begin of run]",
               onClick: (at) => {
                 location.hash = toFlow(points, at);
@@ -274,6 +298,7 @@ export class PathsPage {
           ),
         )
         : h("p", {}, "No flow reached the end of this path."),
+      place,
       h("section", {}, h("h2", {}, "What the latency consists of"), parts),
       sampled,
     ];

@@ -56,6 +56,7 @@ export function palette() {
     "direct",
     "indirect",
     "critical",
+    "warning",
     "gap",
     "pick",
     "focus",
@@ -76,6 +77,8 @@ export class Renderer {
     this.bars = null;
     this.links = null;
     this.gaps = [];
+    this.marks = [];
+    this.counters = new Map();
     this.flow = null;
     this.names = new Map();
     this.hover = null;
@@ -136,12 +139,18 @@ export class Renderer {
     for (const lane of shown) this.stripe(lane);
     this.drawGrid();
     this.drawGaps(shown);
+    this.drawMarks();
     c.save();
     c.beginPath();
     c.rect(this.labelWidth, AXIS, this.plotWidth, this.tall - AXIS);
     c.clip();
     for (const lane of shown) {
       if (lane.type !== "row") continue;
+      if (lane.isCounter) {
+        c.globalAlpha = 1;
+        this.drawCounter(lane);
+        continue;
+      }
       c.globalAlpha =
         this.flow && !["thread", "event", "state", "schedule", "core"].includes(lane.kind)
           ? 0.22
@@ -208,7 +217,7 @@ export class Renderer {
       c,
       lane.label,
       room,
-      lane.type !== "process" && !["thread", "schedule"].includes(lane.kind),
+      lane.type !== "process" && !lane.isCounter && !["thread", "schedule"].includes(lane.kind),
     );
     c.fillText(text, left, y + lane.height / 2);
     if (lane.name) {
@@ -236,6 +245,10 @@ export class Renderer {
       core: colors.running,
       event: colors.event,
       state: colors.active,
+      queue: colors.take,
+      rate: colors.publication,
+      cpu: colors.running,
+      program: colors.running,
       middleware: colors.soft,
     }[kind] ?? colors.soft;
   }
@@ -286,6 +299,52 @@ export class Renderer {
       default:
         return colors.execute;
     }
+  }
+
+  // The value of a counter over time, as high as its share of the most in the run.
+  drawCounter(lane) {
+    const counter = this.counters.get(lane.key);
+    if (!counter) return;
+    const { context: c } = this;
+    const top = AXIS + lane.y - this.scroll + BAR_TOP;
+    const full = lane.height - 2 * BAR_TOP;
+    c.fillStyle = this.laneColor(lane.kind);
+    const column = (from, to, value) => {
+      // Whole pixels: pieces that touch have no seam.
+      const [x0, x1] = [from, to].map((at) =>
+        Math.round(Math.min(Math.max(this.x(at), this.labelWidth), this.width))
+      );
+      const high = Math.min(value / (lane.most || 1), 1) * full;
+      if (x1 > x0 && high > 0) c.fillRect(x0, top + full - high, x1 - x0, high);
+    };
+    const { at, length, values, last } = counter;
+    for (let place = 0; place < at.length; place++) {
+      const end = at[place] + length;
+      column(at[place], end, values[place]);
+      column(end, at[place + 1] ?? counter.until, last[place]);
+    }
+    this.drawn.columns += at.length;
+  }
+
+  // What a counter says at a moment.
+  counterAt(lane, time) {
+    const { at, length, values, last } = this.counters.get(lane.key) ?? { at: [] };
+    const place = lowerBound(at, 0, at.length, time + 1) - 1;
+    if (place < 0) return null;
+    return time < at[place] + length ? values[place] : last[place];
+  }
+
+  // Through all rows: what happened at a moment.
+  drawMarks() {
+    const { context: c, colors } = this;
+    c.globalAlpha = 0.35;
+    for (const mark of this.marks) {
+      const x = this.x(mark.at);
+      if (x < this.labelWidth || x > this.width) continue;
+      c.fillStyle = colors[mark.color];
+      c.fillRect(x, AXIS, 1, this.tall - AXIS);
+    }
+    c.globalAlpha = 1;
   }
 
   // Bars of a pixel or more one by one; narrower ones together in columns, as high as their share
@@ -694,6 +753,16 @@ export class Renderer {
       c.fillText(`${(at / 1e9).toFixed(digits)} s`, x, AXIS / 2);
       c.fillRect(Math.round(x), AXIS - 5, 1, 4);
     }
+    for (const mark of this.marks) {
+      const x = this.x(mark.at);
+      if (x < this.labelWidth || x > this.width) continue;
+      c.fillStyle = colors[mark.color];
+      c.beginPath();
+      c.moveTo(x - 4, AXIS - 8);
+      c.lineTo(x + 4, AXIS - 8);
+      c.lineTo(x, AXIS - 1);
+      c.fill();
+    }
     c.fillStyle = colors.panel;
     c.fillRect(0, 0, this.labelWidth, AXIS - 1);
     c.fillStyle = colors.soft;
@@ -741,6 +810,7 @@ export class Renderer {
     if (lane.type === "critical" && x >= this.labelWidth) return { lane, piece: this.pieceAt(x) };
     if (x < this.labelWidth || lane.type !== "row") return { lane };
     const at = this.time(x);
+    if (lane.isCounter) return { lane, value: this.counterAt(lane, at) };
     const scale = this.plotWidth / (this.view.to - this.view.from);
     if (this.flow) {
       const near = this.flow.vertices

@@ -57,6 +57,8 @@ export class EmbeddedSource {
     if (name === "links") return this.links(own);
     if (name === "flow") return this.flow(own);
     if (name === "neighbour") return this.neighbour(own);
+    // It has those of the whole run alone.
+    if (name === "counter") return this.kept(name, { rates: own.rates }, run);
     // Which path was chosen is in what the report holds already.
     if (name === "critical") return this.kept(name, { kind: own.kind, id: own.id }, run);
     return this.kept(name, own, run);

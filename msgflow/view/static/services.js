@@ -103,6 +103,7 @@ async function callPanel(app, rows, row) {
           values: "duration",
           median: "median",
           target: target(points),
+          marks: app.happened(),
         }),
       ratesOverTime(points, "calls over time", [{
         label: "calls",
@@ -113,7 +114,7 @@ async function callPanel(app, rows, row) {
         color: "service",
         values: Array.from(points.answered),
         dash: [4, 3],
-      }]),
+      }], app.happened()),
       slowestOnes(slowest, {
         title: "Longest calls",
         values: "duration",

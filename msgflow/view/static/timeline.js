@@ -27,7 +27,9 @@ import {
   wallClock,
 } from "./labels.js";
 import { AXIS, Renderer } from "./renderer.js";
-import { indexBars, KERNEL_KINDS, layout, ROW_KINDS } from "./timeline_rows.js";
+import { indexBars, KERNEL_KINDS, KINDS_HIDDEN_FIRST, layout, ROW_KINDS } from "./timeline_rows.js";
+import { Counters, counterText } from "./counters.js";
+import { NEAR_MARK, nearestMark } from "./marks.js";
 import { buildFlow, extent, markCritical } from "./flow.js";
 import { besides, scrolls } from "./table.js";
 import { downloads } from "./download.js";
@@ -108,16 +110,25 @@ export class TimelinePage {
     this.state.internal = asked.internal === "1";
     this.internal.checked = this.state.internal;
     for (const key of (asked.hide ?? "").split(",").filter(Boolean)) this.hideKey(key);
+    const wanted = (asked.show ?? "").split(",");
+    for (const kind of KINDS_HIDDEN_FIRST) {
+      if (!wanted.includes(kind)) this.hideKey(`kind:${kind}`);
+    }
     for (const key of (asked.pin ?? "").split(",").filter(Boolean)) {
       this.state.pinned.add(Number(key));
     }
-    const [rows, gaps] = await Promise.all([
+    const [rows, gaps, marks] = await Promise.all([
       this.app.fetch("row"),
       this.app.fetch("gap"),
+      this.app.happened(),
     ]);
-    this.rows = rows;
-    this.rowAt = new Map();
-    for (let row = 0; row < rows.rows; row++) this.rowAt.set(rows.row_key[row], row);
+    this.renderer.marks = this.minimap.marks = marks;
+    // Of one flow alone there are no counters.
+    this.counters = new Counters(this.app, rows);
+    if (!this.app.source.pages) {
+      await Promise.all([this.counters.read(0), wanted.includes("rate") && this.counters.read(1)]);
+    }
+    this.setRows();
     this.renderer.gaps = Array.from({ length: gaps.rows }, (_, row) => ({
       host: gaps.host[row],
       kind: gaps.kind[row],
@@ -134,6 +145,26 @@ export class TimelinePage {
     // Where only one flow is at hand there is no other one to go to.
     if (this.app.source.pages) this.worst.hidden = true;
     else this.slowest();
+  }
+
+  setRows() {
+    this.rows = this.counters.withRows();
+    this.rowAt = new Map();
+    for (let row = 0; row < this.rows.rows; row++) this.rowAt.set(this.rows.row_key[row], row);
+  }
+
+  // Rows of a kind that are hidden are not read.
+  async showKind(kind) {
+    try {
+      if (kind === "rate") {
+        await this.counters.read(1);
+        this.setRows();
+        this.relayout();
+        await this.load();
+      }
+    } catch (error) {
+      clear(this.status, failed(error));
+    }
   }
 
   // Names, boxes and colours of what only a recording with a kernel trace has.
@@ -187,8 +218,10 @@ export class TimelinePage {
         checked: true,
         on: {
           change: () => {
-            if (box.checked) this.state.kinds.delete(kind);
-            else this.state.kinds.add(kind);
+            if (box.checked) {
+              this.state.kinds.delete(kind);
+              this.showKind(kind);
+            } else this.state.kinds.add(kind);
             this.remember();
             this.relayout();
             this.redraw();
@@ -305,6 +338,12 @@ export class TimelinePage {
       item("indirect", "indirect link", "stroke dashed"),
       item("critical", "critical path", "stroke"),
       item("gap", "not recorded"),
+      h(
+        "span",
+        { className: "legend-item" },
+        h("b", {}, "▼"),
+        "on the axis: what began, ended, or happened once",
+      ),
       this.states,
       h(
         "span",
@@ -327,9 +366,11 @@ export class TimelinePage {
       to: Math.round(this.renderer.view.to),
       q: this.state.query,
       internal: this.state.internal ? "1" : null,
+      show: KINDS_HIDDEN_FIRST.filter((kind) => !this.state.kinds.has(kind)).join(","),
       hide: [
         ...this.state.hidden,
-        ...[...this.state.kinds].map((kind) => `kind:${kind}`),
+        ...[...this.state.kinds].filter((kind) => !KINDS_HIDDEN_FIRST.includes(kind))
+          .map((kind) => `kind:${kind}`),
         ...this.state.folded,
       ].join(","),
       pin: [...this.state.pinned].join(","),
@@ -466,6 +507,8 @@ export class TimelinePage {
       this.isOpening = false;
       this.redraw();
       this.say();
+      this.renderer.counters = await this.counters.within(params.start, params.end, signal);
+      this.redraw();
       if (!table.meta.bin) {
         const links = await this.app.fetch("links", params, signal);
         this.renderer.links = links;
@@ -811,7 +854,20 @@ export class TimelinePage {
     this.drop();
   }
 
+  // What happened at the moment under the pointer, where it is on the axis.
+  markAt(x, y) {
+    const { from, to } = this.renderer.view;
+    if (y >= AXIS || x < this.renderer.labelWidth) return null;
+    const near = (NEAR_MARK * (to - from)) / this.renderer.plotWidth;
+    return nearestMark(this.renderer.marks, this.renderer.time(x), near);
+  }
+
   hoverAt(x, y) {
+    const mark = this.markAt(x, y);
+    if (mark) {
+      this.tip(h("span", {}, mark.text), x, AXIS, 0);
+      return;
+    }
     const hit = this.renderer.pick(x, y);
     if (hit?.lane !== this.renderer.hover?.lane) {
       this.renderer.hover = hit ? { lane: hit.lane } : null;
@@ -826,15 +882,21 @@ export class TimelinePage {
       this.tooltip.hidden = true;
       return;
     }
-    clear(
-      this.tooltip,
+    this.tip(
       hit.piece === undefined ? this.describe(hit, x) : this.describePiece(hit.piece),
+      x,
+      AXIS + hit.lane.y - this.renderer.scroll,
+      hit.lane.height,
     );
+  }
+
+  // Shows a tooltip for a row, given its height and where it lies.
+  tip(content, x, row, height) {
+    clear(this.tooltip, content);
     this.tooltip.hidden = false;
     const box = this.tooltip.getBoundingClientRect();
     // Below the row or above it, never over its bars; where neither has room, beside the pointer.
-    const row = AXIS + hit.lane.y - this.renderer.scroll;
-    const [above, below] = [row - box.height - 4, row + hit.lane.height + 4];
+    const [above, below] = [row - box.height - 4, row + height + 4];
     const frame = this.canvas.getBoundingClientRect();
     const isBelow = frame.top + below + box.height <= innerHeight || frame.top + above < 0;
     const within = (at, room, size) => `${Math.max(Math.min(at, room - size - 6), 2)}px`;
@@ -878,6 +940,9 @@ export class TimelinePage {
     ];
     if (rows.symbol[row]) {
       lines.push(h("span", { className: "symbol" }, shortSymbol(rows.symbol[row])));
+    }
+    if (lane.isCounter && typeof hit.value === "number") {
+      lines.push(h("span", {}, counterText(lane.kind, hit.value)));
     }
     if (hit.kind === undefined) {
       if (x > this.renderer.labelWidth) {

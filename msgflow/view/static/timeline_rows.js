@@ -1,5 +1,6 @@
 // Rows of the timeline: which there are, in which order, and where they lie on the canvas.
 
+import { COUNTER_KINDS } from "./counters.js";
 import { shortSymbol } from "./symbols.js";
 
 export const HEIGHTS = { critical: 26, host: 22, process: 20, node: 20, row: 20 };
@@ -16,10 +17,15 @@ export const ROW_KINDS = {
   thread: "executors",
   schedule: "threads to the kernel",
   core: "cores",
+  queue: "queues of several messages",
+  rate: "rates",
+  cpu: "CPU use",
 };
+// Kinds of rows that are hidden until somebody wants to see them.
+export const KINDS_HIDDEN_FIRST = ["rate"];
 // Kinds of rows that only recordings with a kernel trace have.
 export const KERNEL_KINDS = new Set(["schedule", "core"]);
-const OF_PROCESS = new Set(["thread", "schedule", "core"]);
+const OF_PROCESS = new Set(["thread", "schedule", "core", "cpu"]);
 
 // Options: internal, query, hidden (Set of row keys), folded (Set of header keys), kinds (Set that
 // is hidden), pinned (Set of row keys that come first), only (Set of row keys, or null), critical (whether there is a critical path).
@@ -47,6 +53,8 @@ export function layout(rows, options) {
         kind: rows.kind[row],
         label: `${rows.label[row]} · ${rows.node[row] ?? rows.process[row]}`,
         isPinned: true,
+        isCounter: COUNTER_KINDS.has(rows.kind[row]),
+        most: rows.most?.[row],
         row,
       });
     }
@@ -114,6 +122,8 @@ export function layout(rows, options) {
       // The functions of its callbacks.
       name: rows.symbol[row] ? shortSymbol(rows.symbol[row]).replace("bound method of ", "") : null,
       isInternal: rows.is_internal[row],
+      isCounter: COUNTER_KINDS.has(kind),
+      most: rows.most?.[row],
       isBeside: found?.get(row) === "beside",
       row,
     });

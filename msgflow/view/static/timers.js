@@ -40,7 +40,7 @@ export async function timers(app, choose) {
     identity: (rows, row) => String(rows.callback_id[row]),
     texts: (rows, row) => [rows.node[row], rows.callback[row]],
     panel: (rows, row) =>
-      callbackPanel(app, rows.callback_id[row], `${rows.node[row] ?? ""} ${rows.callback[row]}`),
+      callbackPanel(app, rows.callback_id[row], rows.node[row], rows.callback[row]),
   }).section(
     "Timers",
     "Jitter: how far the time from one call to the next is from the period. Lateness: from the moment at which the timer was due to its call. A click on a row shows the calls over time, and leads to the longest.",

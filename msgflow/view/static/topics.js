@@ -6,8 +6,17 @@ import { dataTable } from "./table.js";
 import { commands, failed, notes, sqlText, waiting } from "./notice.js";
 import { redrawCharts } from "./chart.js";
 import { losses, OF_DELIVERIES } from "./losses.js";
-import { Chooser, onTimeline, overTime, ratesOverTime, searchField, slowestOnes } from "./panel.js";
+import {
+  changesBeside,
+  Chooser,
+  onTimeline,
+  overTime,
+  ratesOverTime,
+  searchField,
+  slowestOnes,
+} from "./panel.js";
 import { Sections } from "./sections.js";
+import { courseColumn, OF_TOPIC } from "./course.js";
 
 const COLUMNS_OF_TOPICS = [
   "topic_name",
@@ -84,6 +93,12 @@ export class TopicsPage {
     const search = searchField(app, "topic", () => [chooser]);
     clear(this.root, h("div", { className: "tools" }, search, sections.links), sections.places);
     this.complete = sections.complete;
+    // How long its messages waited, else how far they were apart.
+    courseColumn(app, table, (row) => [OF_TOPIC, table.topic_name[row]], () => {
+      const [topic, ...others] = COLUMNS_OF_TOPICS;
+      chooser.options.columns = [topic, "course", ...others];
+      chooser.show(table);
+    });
   }
 
   async panel(topic) {
@@ -92,6 +107,7 @@ export class TopicsPage {
       ["topic_point", "topic_slowest"].map((name) => app.inWindow(name, { topic })),
     );
     const target = (rows) => (row) => onTimeline("take", rows.take_id[row]);
+    const { place, marks } = changesBeside(app, (course) => course.of(OF_TOPIC, topic));
     const parts = PARTS_OF_TOPIC.map(([name, title, columns]) => {
       const body = h("div", {}, waiting());
       app.query(name).then((rows) => clear(body, this.part(rows, title, columns, topic)))
@@ -104,17 +120,23 @@ export class TopicsPage {
         ? h(
           "div",
           { className: "charts" },
-          ratesOverTime(points, "messages over time", [{
-            label: "published",
-            color: "publication",
-            values: Array.from(points.published),
-          }, { label: "taken", color: "take", values: Array.from(points.taken), dash: [4, 3] }]),
+          ratesOverTime(
+            points,
+            "messages over time",
+            [{
+              label: "published",
+              color: "publication",
+              values: Array.from(points.published),
+            }, { label: "taken", color: "take", values: Array.from(points.taken), dash: [4, 3] }],
+            marks,
+          ),
           slowest.rows > 0 &&
             overTime(points, {
               title: "latency over time",
               values: "latency",
               median: "median",
               target: (row) => (points.take_id[row] ? target(points)(row) : location.hash),
+              marks,
             }),
           slowestOnes(slowest, {
             title: "Slowest messages",
@@ -124,6 +146,7 @@ export class TopicsPage {
           }),
         )
         : h("p", {}, "No message in the window of time."),
+      place,
       parts,
     ];
   }
