@@ -178,7 +178,7 @@ def _transition(
     for state in _TRANSITIONS[lifecycle.state]:
         # rcl publishes a transition before it emits the event.
         time = publish(thread, middleware, lifecycle.events, time + 4_000, instance)
-        time += int(thread.scheduler.random() * 20_000)
+        time += int(lifecycle.events.random() * 20_000)
         thread.emit(
             machine.tracepoints.rcl_lifecycle_transition,
             time,

@@ -23,7 +23,7 @@ def put(
     thread: Thread, middleware: Middleware, publisher: PublisherObject, message: Message, time: int
 ) -> int:
     """Publish a message from `time` on; returns when its event is recorded, behind its sending."""
-    random = thread.scheduler.random
+    random = publisher.random
     end = time + 400 + int(random() * 2_000)
     if random() < _LATE:
         end += 40_000 + int(random() * 40_000)
@@ -45,7 +45,7 @@ def get(
 ) -> tuple[Taken | None, int]:
     """Take the oldest message for a callback, or for a poll; see `take`."""
     scheduler, machine = thread.scheduler, thread.machine
-    reading = time + 500 + int(scheduler.random() * 2_000)
+    reading = time + 500 + int(subscription.random() * 2_000)
     message = middleware.next_message(subscription, reading)
     is_poll = subscription.description.polled
     if message is None:

@@ -29,7 +29,7 @@ def run_timer(thread: Thread, middleware: Middleware, timer: TimerObject, time: 
     if timer.periods and timer.due >= timer.periods[0][0]:
         since, timer.period = timer.periods.pop(0)
         timer.due = since + timer.period if timer.period else _NEVER
-    start = time + 500 + int(thread.scheduler.random() * 2_500)
+    start = time + 500 + int(timer.random() * 2_500)
     if timer.code.is_agnocast:
         agnocast.make_timer_callable(thread, timer, start - 400)
     if not timer.code.is_callback:
@@ -53,7 +53,7 @@ def run_subscription(
     if taken.is_copy:
         taken.write(thread, subscription, None)
         return time + 300
-    start = time + 400 + int(thread.scheduler.random() * 1_500)
+    start = time + 400 + int(subscription.random() * 1_500)
     if code.is_callback:
         return run_callback(
             thread,
@@ -76,7 +76,7 @@ def run_subscription(
 
 def run_buffer(thread: Thread, middleware: Middleware, buffer: IntraBuffer, time: int) -> Steps:
     """Take one message from a buffer and run the callback with it."""
-    random = thread.scheduler.random
+    random = buffer.random
     time = yield thread.hold(time + 300 + int(random() * 1_500))
     if not buffer.ring.messages:
         # Another thread of the executor was faster.

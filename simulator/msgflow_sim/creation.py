@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from msgflow_sim import system
     from msgflow_sim.discovery import Discovery
     from msgflow_sim.machine import Thread
+    from msgflow_sim.scheduler import Dice
     from msgflow_sim.transport import Middleware
 
 ROSOUT = "/rosout"
@@ -69,12 +70,16 @@ class NodeContext:
         handle: int,
         executors: Sequence[Executor],
         links: Iterable[LinkObject],
+        random_of: Callable[..., Dice],
     ) -> NodeContext:
         """A node without objects, with those of the links of its process that it has part in."""
-        groups = {"": (CallbackGroup(), executors[node.executor])}
+        place = random_of(node.full_name)()
+        groups = {"": (CallbackGroup(place=place, node_place=place), executors[node.executor])}
         for group in node.groups:
             number = node.executor if group.executor is None else group.executor
-            groups[group.name] = (CallbackGroup(group.is_reentrant), executors[number])
+            place_of_group = random_of(node.full_name, group.name)()
+            made = CallbackGroup(group.is_reentrant, place=place_of_group, node_place=place)
+            groups[group.name] = (made, executors[number])
         own = tuple(link for link in links if node.full_name in {link.filled_by, link.used_by})
         publishers: dict[str, PublisherObject] = {}
         objects = NodeObjects(executors, publishers)
@@ -82,7 +87,10 @@ class NodeContext:
 
 
 class Creator:
-    """Creates objects of a process on one of its threads; `time` is how far it has come."""
+    """Creates objects of a process on one of its threads.
+
+    `time` is how far it has come; `random` says how long it takes.
+    """
 
     def __init__(
         self, thread: Thread, middleware: Middleware, discovery: Discovery, network: ServiceNetwork
@@ -93,6 +101,7 @@ class Creator:
         self._discovery = discovery
         self._network = network
         self._process = thread.process
+        self.random = self.dice("creation")
         self._memory = thread.process.memory
         self._tracepoints = thread.machine.tracepoints
         # Since Jazzy generic publishers, serialised and loaned messages have events.
@@ -111,24 +120,28 @@ class Creator:
         other.thread = thread
         return other
 
+    def dice(self, *names: object) -> Dice:
+        """Random numbers for an object of the process."""
+        return self.thread.scheduler.dice(self._process.name, *names)
+
     def emit(self, name: str, *values: object) -> None:
         """Emit an event a little later than the one before."""
         thread = self.thread
-        self.time += 300 + int(thread.scheduler.random() * 1_500)
+        self.time += 300 + int(self.random() * 1_500)
         thread.emit(getattr(self._tracepoints, name), self.time, thread.context, *values)
 
     def _emit_of_rclcpp(self, name: str, *values: object) -> None:
-        if self._process.is_rclcpp:
+        if self._process.is_traced:
             self.emit(name, *values)
 
     def work(self, duration: int) -> None:
         """Let time pass."""
-        self.time += duration // 2 + int(self.thread.scheduler.random() * duration)
+        self.time += duration // 2 + int(self.random() * duration)
 
     def announce(self) -> None:
         """Tell other processes what there is."""
         self.time = self._discovery.announce(
-            self.thread, self._announcer, self._announcement, self.time + 500
+            self.thread, self._announcer, self._announcement, self.time + 500, self.random
         )
 
     def discovery(self, rmw_handle: int) -> None:
@@ -231,7 +244,7 @@ class Creator:
             self.emit(
                 "rcl_subscription_init", handle, node.handle, rmw_handle, topic, description.depth
             )
-        code = self._code(node, description, executor)
+        code = self._code(node, description, executor, topic)
         publishes = description.publishes or any(
             isinstance(action, entity.Publish) for action in description.does
         )
@@ -274,9 +287,9 @@ class Creator:
         """Let others know of a subscription, and its executor spin it."""
         description = created.description
         if not description.polled:
-            created.executor.subscriptions.append(created)
+            created.executor.add(created)
         if created.intra is not None:
-            created.executor.waitables.append(created.intra)
+            created.executor.add(created.intra)
         self.middleware.add_subscription(created)
         if created.intra is not None and description.transient_local:
             self._replay(created.intra, description.topic)
@@ -320,7 +333,7 @@ class Creator:
         rmw_handle = memory.allocate()
         self.emit("rcl_service_init", handle, node.handle, rmw_handle, name)
         group, executor = node.groups[description.group]
-        code = self._code(node, description, executor)
+        code = self._code(node, description, executor, name)
         if description.is_action:
             code = replace(code, is_callback=False)
         service = ServiceObject(
@@ -347,7 +360,7 @@ class Creator:
 
     def spin_service(self, service: ServiceObject) -> None:
         """Let the executor answer requests."""
-        service.executor.waitables.append(service)
+        service.executor.add(service)
         self._network.add(service)
 
     def action_server(self, node: NodeContext, description: entity.ActionServer) -> None:
@@ -413,6 +426,7 @@ class Creator:
             entity.Work(),
             tuple(node.publishers[topic] for topic in description.publishes),
             None,
+            self.dice(node.description.full_name, name, "code"),
             actions,
             bool(actions),
         )
@@ -431,11 +445,11 @@ class Creator:
         )
         node.objects.clients[name] = client
         self._network.add_client(client)
-        executor.waitables.append(client)
+        executor.add(client)
         return client
 
-    def timer(self, node: NodeContext, description: entity.Timer) -> None:
-        """A timer, which its executor calls."""
+    def timer(self, node: NodeContext, description: entity.Timer, number: int) -> None:
+        """A timer, which its executor calls; `number` counts those of the node."""
         self.work(20 * MICROSECOND)
         handle, callback = self._memory.allocate(), self._memory.allocate()
         period = description.period_ns
@@ -462,9 +476,9 @@ class Creator:
             self._emit_of_rclcpp("rclcpp_timer_link_node", handle, node.handle)
             if self._names_groups:
                 self.emit("ros2_caret_callback_group_add_timer", group.handle, handle)
-        code = self._code(node, description, executor)
         name = node.description.full_name
-        executor.timers.append(
+        code = self._code(node, description, executor, f"timer {number}")
+        executor.add(
             TimerObject(
                 name,
                 handle,
@@ -473,6 +487,7 @@ class Creator:
                 code,
                 group,
                 due,
+                self.dice(name, f"timer {number}"),
                 description.reset_ns,
                 list(description.periods),
             )
@@ -500,6 +515,7 @@ class Creator:
         node: NodeContext,
         description: entity.Subscription | entity.Timer | entity.Service,
         executor: Executor,
+        name: str,
     ) -> UserCode:
         publishers = tuple(node.publishers[topic] for topic in description.publishes)
         actions = deeds(description.does, node.objects)
@@ -507,6 +523,7 @@ class Creator:
             description.work,
             publishers,
             node.rosout if description.logs else None,
+            self.dice(node.description.full_name, name, "code"),
             actions,
             bool(actions)
             or self._process.is_stepwise

@@ -12,6 +12,7 @@ from collections import deque
 from msgflow_sim.latency import latency_between
 from msgflow_sim.machine import RunningProcess, Thread
 from msgflow_sim.rmw import read, write
+from msgflow_sim.scheduler import Dice, tail
 
 _TOPIC = "ros_discovery_info"
 _NUMBER = 9
@@ -33,7 +34,7 @@ class DiscoveryListener(Thread):
         self._heard.append(taken)
         if not self._awake:
             self._awake = True
-            awake = time + 10_000 + self.scheduler.tail(20_000)
+            awake = time + 10_000 + tail(self.random, 20_000)
             self.scheduler.at(max(awake, self._done), self._listen)
 
     def _listen(self, time: int, _: None) -> None:
@@ -45,7 +46,7 @@ class DiscoveryListener(Thread):
         while self._heard:
             taken = self._heard.popleft()
             time = read(self, self.rmw_handle, self._message, time, 0, taken)
-            time += 1_500 + int(self.scheduler.random() * 2_000)
+            time += 1_500 + int(self.random() * 2_000)
         self.keep_cpu(time)
         self._awake = False
         self._done = time
@@ -65,10 +66,12 @@ class Discovery:
         """A process has ended."""
         self._listeners.remove(listener)
 
-    def announce(self, thread: Thread, rmw_handle: int, message: int, time: int) -> int:
+    def announce(
+        self, thread: Thread, rmw_handle: int, message: int, time: int, random: Dice
+    ) -> int:
         """Publish what the process has, from `time` on; returns the time when that is done."""
         scheduler, machine = thread.scheduler, thread.machine
-        written = write(thread, rmw_handle, message, time)
+        written = write(thread, rmw_handle, message, time, random)
         publication_id = next(scheduler.publication_ids)
         written.add_to_truth(thread, publication_id)
         scheduler.truth.publication.add(
@@ -91,6 +94,6 @@ class Discovery:
         )
         for listener in self._listeners:
             latency = latency_between(thread.process, listener.process)
-            arrival = written.end + latency.base + scheduler.tail(latency.tail)
+            arrival = written.end + latency.base + tail(random, latency.tail)
             scheduler.at(arrival, listener.hear, int(listener.process is not thread.process))
-        return written.end + 5_000 + int(scheduler.random() * 10_000)
+        return written.end + 5_000 + int(random() * 10_000)

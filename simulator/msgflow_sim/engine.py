@@ -110,9 +110,9 @@ def _simulate(
     clock_offset_ns: int,
     clock_drift_ppm: float,
 ) -> Simulation:
-    # The course of events depends on name and seed only: a longer run begins like a shorter one.
-    # Yet traces that differ in anything never pass for the same.
-    course = f"{chosen.name}/{seed}"
+    # The course of events depends on that name and the seed only: a longer run begins like a
+    # shorter one. Yet traces that differ in anything never pass for the same.
+    course = f"{chosen.draws_like or chosen.name}/{seed}"
     identity = f"{chosen!r}/{seed}/{factor!r}/{clock_offset_ns}/{clock_drift_ppm!r}"
     identity += "".join(f"/{host.kernel!r}" for host in chosen.hosts if host.kernel is not None)
     length = int(chosen.duration_ns * factor)

@@ -13,6 +13,7 @@ from msgflow_sim.entity import MICROSECOND
 from msgflow_sim.kernel import SOFTIRQ, TIMER
 from msgflow_sim.machine import Run, RunningProcess, Steps, Thread
 from msgflow_sim.objects import IntraBuffer, SubscriptionObject, TimerObject
+from msgflow_sim.scheduler import tail
 from msgflow_sim.services import ClientObject, ServiceObject, run_client, run_service
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class ExecutorThread(Thread):
             if woken is not None:
                 self.go_on(woken)
             return
-        wake_at = start + 6 * MICROSECOND + self.scheduler.tail(5 * MICROSECOND)
+        wake_at = start + 6 * MICROSECOND + tail(self.random, 5 * MICROSECOND)
         if self._wake_at is None or wake_at < self._wake_at:
             self._wake_at = wake_at
             self.go_on(wake_at)
@@ -124,7 +125,7 @@ class ExecutorThread(Thread):
                     # It may have to wait for the executor next, but has used its CPU up to here.
                     self.keep_cpu(time + 1)
                     executor.release(time)
-                    time += 900 + int(self.scheduler.random() * 3_000)
+                    time += 900 + int(self.random() * 3_000)
                     continue
             executor.release(time)
             time = yield from self._execute(executor, entity, time)
@@ -140,7 +141,7 @@ class ExecutorThread(Thread):
             time = yield later
         while not self.process.is_stopped:
             self._enter(executor, _WAIT, time, 0)
-            time += 1_500 + int(self.scheduler.random() * 3_000)
+            time += 1_500 + int(self.random() * 3_000)
             executor.collect(time)
             self._enter(executor, _PROCESS, time)
             while (entity := executor.pick(time)) is not None:
@@ -156,7 +157,7 @@ class ExecutorThread(Thread):
 
     def _execute(self, executor: Executor, entity: Entity, time: int) -> Steps:
         """Execute something; returns the time at which the thread goes on, with a CPU."""
-        time += 800 + int(self.scheduler.random() * 3_500)
+        time += 800 + int(entity.random() * 3_500)
         entity.group.is_busy = True
         kind = type(entity)
         if isinstance(entity, _ANNOUNCED) and not entity.code.is_agnocast:
@@ -164,7 +165,7 @@ class ExecutorThread(Thread):
         end = HANDLERS[kind](self, self._middleware, entity, time)
         if not isinstance(end, int):
             end = yield from end
-        end += 400 + int(self.scheduler.random() * 2_000)
+        end += 400 + int(entity.random() * 2_000)
         self.keep_cpu(end)
         time = yield end
         entity.group.is_busy = False
@@ -175,7 +176,7 @@ class ExecutorThread(Thread):
         return time
 
     def _fall_asleep(self, executor: Executor, time: int, until: int | None) -> None:
-        random = self.scheduler.random
+        random = self.random
         time += 300 + int(random() * 2_500)
         timeout = _NO_TIMEOUT if until is None else max(0, until - time)
         self._enter(executor, _WAIT, time, timeout)

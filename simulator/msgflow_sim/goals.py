@@ -117,7 +117,7 @@ class GoalThread(Thread):
             goal = server.waiting.popleft()
             for _ in range(server.description.feedback):
                 time += server.description.period_ns // 2
-                time += int(self.scheduler.random() * server.description.period_ns)
+                time += int(self.random() * server.description.period_ns)
                 time = yield time
                 while later := self.take_cpu(time):
                     time = yield later

@@ -28,7 +28,7 @@ def publish_intra(
     intra = publisher.intra
     assert intra is not None
     scheduler, machine = thread.scheduler, thread.machine
-    random = scheduler.random
+    random = publisher.random
     thread.emit(
         machine.tracepoints.rclcpp_intra_publish,
         time,

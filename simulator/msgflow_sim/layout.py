@@ -43,6 +43,9 @@ class Layout:
         is_stamped_early: DDS makes the stamp when write is entered (Cyclone DDS); else once the
             message is serialised (Fast DDS).
         has_end_of_deferred: callback_end is recorded for a service that answers later.
+        is_ready_hashed: executors look for what is ready in the order of a hash map of objects, and
+            forget a message of a group that is busy until the next wait; else in the order of a map
+            of groups, and by creation in each.
         has_channels: the middleware layer (rmw_zenoh) writes a message with buffers to one channel
             after the other, each time with a stamp of its own, and emits no rmw_publish.
         dds_write: the `dds:*` events of a publication, in order.
@@ -59,6 +62,7 @@ class Layout:
     is_rosout_first: bool = True
     is_stamped_early: bool = False
     has_end_of_deferred: bool = False
+    is_ready_hashed: bool = False
     has_channels: bool = False
     dds_write: tuple[str, ...] = ()
     is_callable_queued: bool = False
@@ -183,6 +187,7 @@ _JAZZY = replace(
     events=_events(_IRON.having("rmw_publish")),
     is_stamped_by_rmw=True,
     is_rosout_first=False,
+    is_ready_hashed=True,
 )
 
 _KILTED = replace(

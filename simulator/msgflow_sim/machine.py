@@ -116,11 +116,13 @@ class RunningProcess:
     Attributes:
         description: what the scenario says about it.
         machine: where it runs.
+        name: what tells it from others, but from other lives of it.
         number: its number among all processes; `life` counts those of this id before it.
         memory: its addresses.
         threads: those that execute callbacks.
         goal_threads: how many execute goals of actions; `agnocast_callbacks` likewise.
         is_stopped: it has ended, or ends as soon as its threads have executed what they execute.
+        is_traced: its callbacks and executors have events.
         is_stepwise: it may end in the middle of a callback.
     """
 
@@ -138,7 +140,9 @@ class RunningProcess:
         self.description = description
         self.number = number
         self.pid = description.pid
+        self.name = f"{description.hostname}/{description.pid}"
         self.is_rclcpp = description.client_library == "rclcpp"
+        self.is_traced = description.client_library != "rclpy"
         self.threads: list[Thread] = []
         self.is_stopped = False
         self.is_stepwise = description.is_killed
@@ -203,6 +207,7 @@ class Thread:
     Attributes:
         process: to which it belongs.
         context: its part of each record.
+        random: its random numbers.
         emit: `emit(tracepoint, time, context, *values)` on the CPU it has.
         running: identifiers of the callback instances that go on, the innermost last.
         description: of its process.
@@ -215,6 +220,7 @@ class Thread:
         self.scheduler = process.scheduler
         self.machine = process.machine
         self.tid = tid
+        self.random = self.scheduler.dice(process.name, "thread", tid)
         self.context = thread_context(process.pid, tid, process.description.name)
         self.cpu = process.number % len(self.machine.emitters)
         self.emit: Callable[..., None] = self.machine.emitters[self.cpu]
@@ -239,7 +245,7 @@ class Thread:
             return self.machine.kernel.take(self, time)
         free_at = self.machine.free_at
         cpu = self.cpu
-        if self.scheduler.random() < _MIGRATION:
+        if self.random() < _MIGRATION:
             cpu = (cpu + 1) % len(free_at)
         if time < self._moved_ns + _LEAST_STAY_NS:
             if free_at[self.cpu] > time:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from msgflow_sim.callback_instance import origins_on
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from msgflow_sim.latency import Latency
     from msgflow_sim.links import CallbackLinks
     from msgflow_sim.machine import RunningProcess, Steps, Thread
+    from msgflow_sim.scheduler import Dice
 
 
 class Message:
@@ -130,6 +131,7 @@ class PublisherObject:
         is_silent: its release of ROS 2 has no events for this kind of publisher.
         matches: one per subscription of the topic.
         history: what is kept for subscriptions that come late (transient local).
+        random: its random numbers.
         sent: everything so far, while further subscriptions of the topic are still to come.
     """
 
@@ -149,6 +151,15 @@ class PublisherObject:
     is_silent: bool = False
     history: deque[Message] | None = None
     sent: list[Message] = field(default_factory=list)
+    random: Dice = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.random = self.process.scheduler.dice(self.name, "publisher")
+
+    @property
+    def name(self) -> str:
+        """What tells it from others."""
+        return f"{self.process.name}{self.node}{self.topic}"
 
     @property
     def route(self) -> str:
@@ -203,6 +214,16 @@ class SubscriptionObject:
     intra: IntraBuffer | None = None
     ended: int | None = None
     arrivals: dict[int, int] = field(default_factory=dict)
+    random: Dice = field(init=False)
+    kind: ClassVar[str] = "subscription"
+
+    def __post_init__(self) -> None:
+        self.random = self.process.scheduler.dice(self.name, "subscription")
+
+    @property
+    def name(self) -> str:
+        """What tells it from others, but from others of its node on the topic."""
+        return f"{self.process.name}{self.node}{self.description.topic}"
 
     def is_ready(self, time: int) -> bool:
         """Whether a message is there."""
@@ -216,6 +237,7 @@ class Match:
     Attributes:
         is_intra: they are in one process and pass messages there.
         missed: what was published before and may still be delivered (transient local).
+        random: says how long messages travel, and which get lost.
     """
 
     subscription: SubscriptionObject
@@ -223,6 +245,7 @@ class Match:
     latency: Latency
     is_intra: bool
     loss: float
+    random: Dice
     missed: list[Message] | None = None
     last_arrival: int = 0
 
@@ -284,11 +307,17 @@ class IntraBuffer:
     callback: int
     # No executor event names it.
     handle: int = 0
+    kind: ClassVar[str] = "waitable"
 
     @property
     def group(self) -> CallbackGroup:
         """That of the subscription."""
         return self.subscription.group
+
+    @property
+    def random(self) -> Dice:
+        """That of the subscription."""
+        return self.subscription.random
 
     def is_ready(self, time: int) -> bool:
         """Whether a message is in it."""
@@ -303,6 +332,7 @@ class UserCode:
         work: how long it computes.
         publishers: where it publishes, in this order.
         log: the publisher of /rosout, if it logs.
+        random: says how long it computes.
         deeds: what it does then, each `deed(thread, middleware, time, instance)`.
         is_stepwise: other threads must be able to act between its publications.
         is_callback: it runs in a callback that is traced.
@@ -314,6 +344,7 @@ class UserCode:
     work: Work
     publishers: tuple[PublisherObject, ...]
     log: PublisherObject | None
+    random: Dice
     deeds: tuple[Callable[..., Steps], ...] = ()
     is_stepwise: bool = False
     is_callback: bool = True
@@ -337,8 +368,10 @@ class TimerObject:
     code: UserCode
     group: CallbackGroup
     due: int
+    random: Dice
     reset: int | None = None
     periods: list[tuple[int, int]] = field(default_factory=list)
+    kind: ClassVar[str] = "timer"
 
     def is_ready(self, time: int) -> bool:
         """Whether it has to be called."""

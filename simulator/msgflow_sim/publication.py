@@ -29,7 +29,7 @@ def publish(
     to the subscriptions of the process already.
     """
     scheduler = thread.scheduler
-    random = scheduler.random
+    random = publisher.random
     machine = thread.machine
     pace = machine.publish_pace
     tracepoints = machine.tracepoints
@@ -66,12 +66,12 @@ def publish(
     message.rcl_ns = rcl + epoch
     if (channels := publisher.channels(rcl)) is not None:
         message.rmw = rcl
-        message.stamps, end = write_to_channels(thread, channels, rcl, size_bytes)
+        message.stamps, end = write_to_channels(thread, channels, rcl, random, size_bytes)
         message.stamp_ns = min(message.stamps.values(), default=None)
         write_publication(thread, publisher, message, instance)
         middleware.send(end, message)
         return end + int((3_000 + int(random() * 6_000)) * pace)
-    written = write(thread, publisher.rmw_handle, publisher.message, rcl, size_bytes)
+    written = write(thread, publisher.rmw_handle, publisher.message, rcl, random, size_bytes)
     rmw, message.stamp_ns = written.rmw, written.stamp_ns
     message.rmw, message.rmw_ns = rmw, rmw + epoch
     written.add_to_truth(thread, message.publication_id)

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from msgflow_sim.scheduler import Dice, tail
+
 if TYPE_CHECKING:
     from msgflow_sim.machine import Thread
     from msgflow_sim.objects import SubscriptionObject
@@ -57,10 +59,12 @@ def entity_of(rmw_handle: int) -> int:
     return rmw_handle + _ENTITY_OFFSET
 
 
-def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: int = 0) -> Written:
+def write(
+    thread: Thread, rmw_handle: int, message: int, time: int, random: Dice, size_bytes: int = 0
+) -> Written:
     """Publish a message in the middleware layer, called at `time`."""
     machine = thread.machine
-    random, layout = thread.scheduler.random, machine.layout
+    layout = machine.layout
     tracepoints, emit, context = machine.tracepoints, thread.emit, thread.context
     pace = machine.publish_pace
     duration = int(size_bytes * _SERIALISING_NS_PER_BYTE * (0.8 + 0.4 * random()))
@@ -78,7 +82,7 @@ def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: 
     emit(tracepoints.ros2_caret_dds_write, entered, context, message)
     stamp = entered + int((200 + int(random() * 800)) * pace)
     if not layout.is_stamped_early:
-        stamp += duration + int(thread.scheduler.tail(1_500) * pace)
+        stamp += duration + int(tail(random, 1_500) * pace)
         if random() < _HELD_UP:
             stamp += int(random() * _LONGEST_HOLD_UP_NS)
     stamp_ns = machine.stamp_ns(stamp)
@@ -103,18 +107,22 @@ def write(thread: Thread, rmw_handle: int, message: int, time: int, size_bytes: 
 
 
 def write_to_channels(
-    thread: Thread, channels: list[list[SubscriptionObject]], time: int, size_bytes: int
+    thread: Thread,
+    channels: list[list[SubscriptionObject]],
+    time: int,
+    random: Dice,
+    size_bytes: int,
 ) -> tuple[dict[SubscriptionObject, int], int]:
     """Publish a message on one channel after the other, called at `time`; no event tells.
 
     Returns the source stamps by subscription, and the time at which the call returns.
     """
-    scheduler, machine = thread.scheduler, thread.machine
+    machine = thread.machine
     stamps: dict[SubscriptionObject, int] = {}
     for channel in channels:
-        time += 400 + int(scheduler.random() * 800)
-        time += int(size_bytes * _SERIALISING_NS_PER_BYTE * (0.8 + 0.4 * scheduler.random()))
-        time += int(scheduler.tail(1_500))
+        time += 400 + int(random() * 800)
+        time += int(size_bytes * _SERIALISING_NS_PER_BYTE * (0.8 + 0.4 * random()))
+        time += tail(random, 1_500)
         stamps |= dict.fromkeys(channel, machine.stamp_ns(time))
         time += 1_000 + int(size_bytes * _SENDING_NS_PER_BYTE)
     return stamps, time

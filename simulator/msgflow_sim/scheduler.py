@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from heapq import heappop, heappush
 from itertools import count
@@ -13,18 +14,23 @@ if TYPE_CHECKING:
     from msgflow_sim.truth import Truth
 
 Action = Callable[[int, Any], None]
+# Returns the next even number in 0..1.
+Dice = Callable[[], float]
 
 _GRACE_NS = 1_000_000_000
 
 
+def tail(random: Dice, scale: int) -> int:
+    """A waiting time with mean `scale`: mostly short, now and then long."""
+    return int(-log(1.0 - random()) * scale)
+
+
 class Scheduler:
-    """The agenda, the dice and the truth.
+    """The agenda, all dice and the truth.
 
     Time is in ns since the begin of tracing, the same on all hosts.
 
     Attributes:
-        random: next even number in 0..1. Nothing else is drawn from, so that one seed gives one
-            course of events.
         truth: where what happens is written down.
         publication_ids: numbers for publications; likewise for takes, callback instances,
             requests and subscriptions.
@@ -32,7 +38,8 @@ class Scheduler:
     """
 
     def __init__(self, seed: str, truth: Truth) -> None:
-        self.random = Random(seed).random
+        self._seed = seed
+        self._named: Counter[str] = Counter()
         self.truth = truth
         self.publication_ids = count()
         self.take_ids = count()
@@ -48,9 +55,15 @@ class Scheduler:
         """Have `action(time, argument)` called at `time`."""
         heappush(self._agenda, (time, next(self._order), action, argument))
 
-    def tail(self, scale: int) -> int:
-        """A waiting time with mean `scale`: mostly short, now and then long."""
-        return int(-log(1.0 - self.random()) * scale)
+    def dice(self, *names: object) -> Dice:
+        """Random numbers for one object alone, by its name; a second one of it has others.
+
+        The seed and the name decide them. So systems that differ in one thing draw the same
+        numbers wherever they do the same.
+        """
+        name = "/".join(str(name) for name in names)
+        self._named[name] += 1
+        return Random(f"{self._seed}/{name}/{self._named[name]}").random
 
     def run(self, stop: int, last: Action) -> None:
         """Let things happen until `stop` and on until the next `last` action would.

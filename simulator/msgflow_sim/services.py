@@ -9,19 +9,20 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from msgflow_sim.callback_instance import CallbackInstance
 from msgflow_sim.callbacks import run_callback
 from msgflow_sim.latency import latency_between
 from msgflow_sim.machine import Run, settle
+from msgflow_sim.scheduler import tail
 from msgflow_sim.user_code import execute
 
 if TYPE_CHECKING:
     from msgflow_sim.executor import CallbackGroup, Executor
     from msgflow_sim.machine import RunningProcess, Steps, Thread
     from msgflow_sim.objects import UserCode
-    from msgflow_sim.scheduler import Scheduler
+    from msgflow_sim.scheduler import Dice, Scheduler
     from msgflow_sim.transport import Middleware
     from msgflow_sim.truth import Truth
 
@@ -94,6 +95,12 @@ class ServiceObject:
     action: Answer | None = None
     requests: deque[Request | None] = field(default_factory=deque)
     waiting: deque[Request] = field(default_factory=deque)
+    random: Dice = field(init=False)
+    kind: ClassVar[str] = "service"
+
+    def __post_init__(self) -> None:
+        process = self.process
+        self.random = process.scheduler.dice(process.name, self.node, self.name, "service")
 
     def is_ready(self, time: int) -> bool:
         """Whether a request is there."""
@@ -125,6 +132,12 @@ class ClientObject:
     answered: int = 0
     action: Callable[[Thread, Request, int], int] | None = None
     responses: deque[Request | None] = field(default_factory=deque)
+    random: Dice = field(init=False)
+    kind: ClassVar[str] = "client"
+
+    def __post_init__(self) -> None:
+        process = self.process
+        self.random = process.scheduler.dice(process.name, self.node, self.name, "client")
 
     def is_ready(self, time: int) -> bool:
         """Whether a response is there."""
@@ -153,14 +166,14 @@ class ServiceNetwork:
         self._requests.append(request)
         service = self._services.get(request.client.name)
         if service is not None and not service.process.is_stopped:
-            arrival = self._arrival(time, request.client.process, service.process)
+            arrival = self._arrival(time, request.client, service)
             self._scheduler.at(arrival, self._arrive, (service, request))
 
     def send_response(self, time: int, service: ServiceObject, request: Request) -> None:
         """Send a response: all clients of the service get it, one can take it."""
         for client in self._clients[service.name]:
             if client is request.client or not client.process.is_stopped:
-                arrival = self._arrival(time, service.process, client.process)
+                arrival = self._arrival(time, service, client)
                 response = request if client is request.client else None
                 self._scheduler.at(arrival, self._arrive, (client, response))
 
@@ -177,16 +190,18 @@ class ServiceNetwork:
         queue.append(request)
         owner.executor.arrive(owner, time)
 
-    def _arrival(self, time: int, source: RunningProcess, target: RunningProcess) -> int:
-        latency = latency_between(source, target)
-        return time + latency.base + self._scheduler.tail(latency.tail)
+    def _arrival(
+        self, time: int, source: ServiceObject | ClientObject, target: ServiceObject | ClientObject
+    ) -> int:
+        latency = latency_between(source.process, target.process)
+        return time + latency.base + tail(source.random, latency.tail)
 
 
 def call(
     thread: Thread, client: ClientObject, time: int, cause: CallbackInstance | None
 ) -> tuple[int, Request]:
     """Send a request; returns the time at which the call returns, and the request."""
-    random, machine = thread.scheduler.random, thread.machine
+    random, machine = client.random, thread.machine
     client.sequence_number += 1
     sent = time + 400 + int(random() * 1_500)
     thread.emit(
@@ -216,7 +231,7 @@ def call(
 def run_service(thread: Thread, middleware: Middleware, service: ServiceObject, time: int) -> Steps:
     """Take a request, run the callback, send the response; returns the time when that is done."""
     machine = thread.machine
-    random, tracepoints, epoch = thread.scheduler.random, machine.tracepoints, machine.epoch
+    random, tracepoints, epoch = service.random, machine.tracepoints, machine.epoch
     time += 1_000 + int(random() * 5_000)
     request = service.requests.popleft()
     assert request is not None
@@ -276,7 +291,7 @@ def answer(
 def respond(thread: Thread, service: ServiceObject, request: Request, time: int) -> int:
     """Send the response to a request; returns the time at which that is done."""
     machine = thread.machine
-    random = thread.scheduler.random
+    random = service.random
     stamp = time + 300 + int(random() * 500)
     sent = stamp + 60 + int(random() * 300)
     request.stamp_ns, request.answered_ns = machine.stamp_ns(stamp), sent + machine.epoch
@@ -300,7 +315,7 @@ def run_client(thread: Thread, middleware: Middleware, client: ClientObject, tim
 
     Nothing is there to take if it was one to another client.
     """
-    random, machine = thread.scheduler.random, thread.machine
+    random, machine = client.random, thread.machine
     time += 1_000 + int(random() * 5_000)
     request = client.responses.popleft()
     if request is None:

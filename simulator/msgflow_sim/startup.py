@@ -51,8 +51,14 @@ class Startup:
         self._version = version
         self._scheduler = process.scheduler
         self._executors = tuple(
-            Executor(process.scheduler, description, is_rclcpp=process.is_rclcpp)
-            for description in process.description.executors
+            Executor(
+                process.scheduler.dice(process.name, "executor", number),
+                description,
+                is_rclcpp=process.is_rclcpp,
+                is_traced=process.is_traced,
+                is_hashed=process.machine.layout.is_ready_hashed,
+            )
+            for number, description in enumerate(process.description.executors)
         )
         self._creator = Creator(self.thread, middleware, discovery, network)
         self._user_thread = UserThread(process, self._creator)
@@ -136,6 +142,8 @@ class Startup:
         if any(not node.is_agnocast for node in process.description.nodes):
             creator.emit("rcl_init", process.memory.allocate(), self._version)
             creator.work(800 * MICROSECOND)
+            if process.is_traced and not process.is_rclcpp:
+                creator.emit("rclcpp_callback_register", 0, "#msgflow python 3.12.3")
             self._listener = DiscoveryListener(process)
             creator.discovery(self._listener.rmw_handle)
             self._discovery.join(self._listener)
@@ -161,7 +169,9 @@ class Startup:
 
     def _create_node(self, node: system.Node) -> Iterator[bool]:
         creator, memory = self._creator, self._process.memory
-        context = NodeContext.of(node, memory.allocate(), self._executors, self._links)
+        context = NodeContext.of(
+            node, memory.allocate(), self._executors, self._links, creator.dice
+        )
         self._created[node.full_name] = context
         creator.work(300 * MICROSECOND)
         for group, executor in context.groups.values():
@@ -271,8 +281,8 @@ class Startup:
         for action_client in description.action_clients:
             creator.action_client(node, action_client)
             yield True
-        for timer in description.timers:
-            creator.timer(node, timer)
+        for number, timer in enumerate(description.timers):
+            creator.timer(node, timer, number)
             yield True
         if description.links:
             creator.links(node, self._created)

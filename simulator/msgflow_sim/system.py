@@ -133,7 +133,8 @@ class Process:
         stop_ns: when it ends; None: after the end of tracing. A process that ends frees its id,
             so that another life of it may follow, at the same addresses.
         is_killed: it ends at once, in the middle of whatever it does.
-        client_library: 'rclcpp' or 'rclpy', which has no events of its own.
+        client_library: 'rclcpp', 'rclpy', which has no events of its own, or 'traced_rclpy': its
+            callbacks and executors have those of rclcpp (msgflow record).
         starved_ns: period, and how long at its end none of its threads gets a CPU; one that runs
             already goes on.
         threads_from: threads other than the main one have ids above this; the process id if None.
@@ -247,6 +248,7 @@ class Scenario:
         overwrites: a full queue drops its oldest message (keep last); when false, queues hold
             whatever comes, so that every message is delivered.
         recording: how its traces are recorded.
+        draws_like: name of the scenario that it is a change of: both have the same random numbers.
     """
 
     name: str
@@ -257,6 +259,7 @@ class Scenario:
     layout: str = "jazzy"
     overwrites: bool = False
     recording: Recording = PERFECT
+    draws_like: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
         hostnames = {host.hostname for host in self.hosts}

@@ -10,6 +10,7 @@ from msgflow_sim.rmw import read
 if TYPE_CHECKING:
     from msgflow_sim.machine import Thread
     from msgflow_sim.objects import Message, SubscriptionObject
+    from msgflow_sim.scheduler import Dice
     from msgflow_sim.transport import Middleware
 
 
@@ -132,14 +133,16 @@ def take(
     """
     scheduler = thread.scheduler
     epoch, buffer = thread.machine.epoch, subscription.message
-    reading = time + 2_000 + int(scheduler.random() * 8_000)
+    # What fails by chance leaves the numbers of what is taken alone.
+    random = subscription.random if subscription.queue else thread.random
+    reading = time + 2_000 + int(random() * 8_000)
     message = middleware.next_message(subscription, reading)
     if message is None:
         middleware.failed_takes += 1
         if subscription.is_silent:
             return None, reading
         rmw = read(thread, subscription.rmw_handle, buffer, reading, 0, 0)
-        rcl, rclcpp = _pass_layers(thread, subscription, rmw)
+        rcl, rclcpp = _pass_layers(thread, subscription, rmw, random)
         return None, rclcpp or rcl
     taken = Taken(
         next(scheduler.take_ids),
@@ -156,7 +159,7 @@ def take(
     assert stamp_ns is not None
     rmw = read(thread, subscription.rmw_handle, buffer, reading, stamp_ns, 1)
     taken.method, taken.time, taken.rmw_ns = "rmw", rmw, rmw + epoch
-    rcl, rclcpp = _pass_layers(thread, subscription, rmw)
+    rcl, rclcpp = _pass_layers(thread, subscription, rmw, random)
     taken.rcl_ns = rcl + epoch
     if rclcpp is not None:
         taken.rclcpp_ns = rclcpp + epoch
@@ -164,13 +167,13 @@ def take(
 
 
 def _pass_layers(
-    thread: Thread, subscription: SubscriptionObject, rmw: int
+    thread: Thread, subscription: SubscriptionObject, rmw: int, random: Dice
 ) -> tuple[int, int | None]:
     """Emit what the layers above rmw emit after its `rmw_take`, also of a take that failed.
 
     Returns the times of rcl_take and of rclcpp_take.
     """
-    random, tracepoints = thread.scheduler.random, thread.machine.tracepoints
+    tracepoints = thread.machine.tracepoints
     rcl = rmw + 200 + int(random() * 900)
     thread.emit(tracepoints.rcl_take, rcl, thread.context, subscription.message)
     if not subscription.is_rclcpp:

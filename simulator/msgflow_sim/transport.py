@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from msgflow_sim.caret import DataListener
 from msgflow_sim.latency import AGNOCAST, AT_ONCE, latency_between
 from msgflow_sim.objects import Match
+from msgflow_sim.scheduler import tail
 
 if TYPE_CHECKING:
     from msgflow_sim.machine import Machine, RunningProcess
@@ -109,7 +110,7 @@ class Middleware:
 
     def send(self, time: int, message: Message) -> None:
         """Send a message at `time` to the subscriptions that the publisher knows."""
-        scheduler, publisher = self._scheduler, message.publisher
+        publisher = message.publisher
         self.remember(message)
         if publisher.history is not None:
             publisher.history.append(message)
@@ -122,7 +123,7 @@ class Middleware:
                 self.drop(message, match.subscription, "before_discovery")
                 continue
             loss = match.loss if time >= match.subscription.description.loss_from_ns else 0
-            if loss and scheduler.random() < loss:
+            if loss and match.random() < loss:
                 self.drop(message, match.subscription, "lost_in_transport")
                 continue
             self._deliver(time, message, match)
@@ -240,7 +241,7 @@ class Middleware:
 
     def _deliver(self, time: int, message: Message, match: Match) -> None:
         latency = match.latency
-        arrival = time + latency.base + self._scheduler.tail(latency.tail)
+        arrival = time + latency.base + tail(match.random, latency.tail)
         if arrival <= match.last_arrival:
             arrival = match.last_arrival + 1
         match.last_arrival = arrival
@@ -260,14 +261,18 @@ class Middleware:
             latency = AGNOCAST
         elif subscription.executor.is_in_order and publisher.process is subscription.process:
             latency = AT_ONCE
+        ends = (publisher.name, subscription.name)
+        random = self._scheduler.dice("match", *ends)
         since = max(publisher.created, subscription.created) + latency.discovery
-        since += int(self._scheduler.random() * latency.discovery_spread)
+        since += int(random() * latency.discovery_spread)
         since += subscription.description.discovery_ns
         buffer, intra = subscription.intra, publisher.intra
         is_intra = (
             buffer is not None and intra is not None and publisher.process is subscription.process
         )
-        match = Match(subscription, since, latency, is_intra, subscription.description.loss)
+        random = self._scheduler.dice("delay", *ends)
+        loss = subscription.description.loss
+        match = Match(subscription, since, latency, is_intra, loss, random)
         publisher.matches.append(match)
         if buffer is not None and intra is not None and is_intra and subscription.ended is None:
             intra.targets.append(buffer)

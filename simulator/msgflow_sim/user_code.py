@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from msgflow_sim.links import CallbackLinks
     from msgflow_sim.machine import Run, Steps, Thread
     from msgflow_sim.objects import UserCode
+    from msgflow_sim.scheduler import Dice
     from msgflow_sim.transport import Middleware
 
 # A callback that only puts a message into a cache.
@@ -87,7 +88,7 @@ def _fill_and_publish(
     fired = links.fill(instance, is_late=False)
     work = code.work
     if links.gates(is_late=True):
-        time = yield thread.hold(time + _duration(thread, work, start))
+        time = yield thread.hold(time + _duration(code.random, work, start))
         fired |= links.fill(instance, is_late=True)
         work = _KEEPING
     published: Counter[str] = Counter()
@@ -119,7 +120,7 @@ def _execute(
     cause: Callable[[str, int], CallbackInstance] | None = None,
 ) -> Run:
     work = code.work
-    duration = _duration(thread, work, start)
+    duration = _duration(code.random, work, start)
     before = duration * work.percent_before // 100
     rest = 200 + duration * (100 - work.percent_before) // 100
     if code.is_stepwise or thread.machine.kernel is not None:
@@ -132,8 +133,7 @@ def _execute(
     return time + rest
 
 
-def _duration(thread: Thread, work: Work, start: int) -> int:
-    random = thread.scheduler.random
+def _duration(random: Dice, work: Work, start: int) -> int:
     duration = work.typical_ns + int(random() * work.spread_ns)
     if work.slow_probability and random() < work.slow_probability:
         duration += int((1 + random()) * work.slow_ns / 2)

@@ -81,7 +81,9 @@ def test_an_address_is_used_again(recordings):
 @pytest.mark.thorough
 def test_a_subscription_is_there_once_the_middleware_has_it(tmp_path, read):
     """What is sent before the rest of it is created comes before discovery."""
-    recording = read(simulate("host_chain", tmp_path, layout="humble-cyclonedds", factor=0.1))
+    recording = read(
+        simulate("host_chain", tmp_path, layout="humble-cyclonedds", factor=0.1, seed=1)
+    )
     created = recording.truth("SELECT pid, rmw_subscription_handle, created_ns FROM subscription")
     initialised = {
         (e.pid, e.fields["rmw_subscription_handle"]): e.ts_ns

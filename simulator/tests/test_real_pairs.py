@@ -38,6 +38,7 @@ REAL = {
 SIMULATED = {
     "services": 0.3,
     "calls": 0.1,
+    "intra_process": 0.1,
     "mixed_intra_process": 0.1,
     "demo": 0.1,
     "restarts": 0.6,

@@ -95,6 +95,7 @@ def _scenario(name: str, description: str, fusion: Executor) -> Scenario:
         duration_ns=20 * SECOND,
         layout="rolling",
         overwrites=True,
+        draws_like="autoware",
     )
 
 

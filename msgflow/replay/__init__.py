@@ -1,0 +1,1 @@
+"""Replay of a recorded run: how late its messages would be if something were changed."""
