@@ -93,7 +93,7 @@ def _show(
         lines = partial(moment_lines, found)
         print_sections(found.sections, form, output, None if wide else lines)
         for step in found.steps:
-            print_status(f"next: {_command(step, part, database)}")
+            print_status(f"next: {_command(step, {'run': part.get('run')}, database)}")
         return
     brief = partial(_brief, found, lambda words: _command(words, part, database))
     print_sections(found.sections, form, output, None if wide else brief)

@@ -55,7 +55,8 @@ def explain_moment(
 ) -> Moment:
     """Return what happened at a moment of a run; of paths those that end at a place."""
     at_ns, begin_ns = time_point(at, (run,), "--at"), run.start_ns or 0
-    if not begin_ns <= at_ns <= (run.end_ns or 0):
+    window = times.window((run,))
+    if not max(begin_ns, window.start_ns) <= at_ns <= min(run.end_ns or 0, window.end_ns):
         raise UsageError(f"the run has no such moment — {at}", "msgflow runs says how long it is")
     values = {"runs": [run.run_id], "at_ns": at_ns, "run_start_ns": begin_ns}
     with Steps(connection) as steps:

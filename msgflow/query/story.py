@@ -85,7 +85,7 @@ def read_story(connection: duckdb.DuckDBPyConnection, request_id: int) -> Story:
     rows = steps.table.to_pylist()
     stages = [row for row in rows if row["took_ns"] is not None and row["is_stage"]]
     total_ns = sum(row["took_ns"] for row in stages)
-    last = (stages or rows)[-1]
+    last = (stages or rows[:1])[-1]
     worst = max(stages, key=lambda row: row["took_ns"], default=rows[0])
     asked = (
         row
@@ -93,13 +93,15 @@ def read_story(connection: duckdb.DuckDBPyConnection, request_id: int) -> Story:
         if row["request_id"] and (row["what"] or "").startswith(str(worst["what"]))
     )
     words = header.next_command(next(asked, worst))
+    is_sent = rows[0]["step"] == "sent"
     at_s = (rows[0]["at_ns"] - (run.start_ns or 0)) / 1e9
     verdict = {
         "headline": [
-            f"{rows[0]['what']} {request_id}, from {rows[0]['node']} at {at_s:.3f} s:"
+            f"{rows[0]['what']} {request_id}, {'from' if is_sent else 'at'} {rows[0]['node']}"
+            f" at {at_s:.3f} s:"
             f" {format_duration(total_ns)} until {last['step']}"
         ],
-        "evidence": [[_longest(worst), *_open(last["step"])]],
+        "evidence": [[_longest(worst), *(_open(last["step"]) if is_sent else [])]],
         "next": [words and shlex.join(words)],
     }
     return Story(
@@ -113,7 +115,7 @@ def read_story(connection: duckdb.DuckDBPyConnection, request_id: int) -> Story:
 def _open(step: str) -> list[str]:
     """Return that it is not over, unless a step is an end."""
     is_over = step in ("answer taken", "rejected", "result taken")
-    return [] if is_over else [f"nothing follows until the end of the recording: it is {step}"]
+    return [] if is_over else [f"nothing more is recorded; the last that is known: {step}"]
 
 
 def _longest(stage: Mapping[str, Any]) -> str:

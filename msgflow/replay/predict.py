@@ -173,8 +173,9 @@ def changed(system: System, changes: Iterable[Change]) -> System:
         if change.kind not in _CHANGES:
             hint = did_you_mean(change.kind, [*_CHANGES], f"choose {' or '.join(_CHANGES)}")
             raise UsageError(f"nothing of that kind can be changed — {change.kind}", hint)
-        if change.value <= 0:
-            raise UsageError(f"it has to be above 0 — {change.kind} {change.value:g}")
+        least = 0 if change.kind in ("duration", "phase") else 1
+        if change.value < least or not change.value:
+            raise UsageError(f"it is too little — {change.kind} {change.value:g}")
         chosen = [each for each in callbacks.values() if change.place in _names(each, change.kind)]
         if not chosen:
             known = {name for each in callbacks.values() for name in _names(each, change.kind)}

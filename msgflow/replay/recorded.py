@@ -137,7 +137,7 @@ def _callbacks(tables: Mapping[str, Sequence[Row]], groups: str) -> dict[int, Ca
             row["subscription_id"],
             row["queue_depth"],
             group,
-            row["period_ns"] if row["created_ns"] is not None else None,
+            (row["period_ns"] or None) if row["created_ns"] is not None else None,
             (row["created_ns"] or 0) + (row["period_ns"] or 0),
             rank=ranks[number],
         )

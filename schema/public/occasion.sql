@@ -151,7 +151,12 @@ JOIN main.publisher AS u ON b.publisher_id = u.publisher_id
 JOIN main.node AS n ON u.node_id = n.node_id
 JOIN main.process AS p ON n.process_id = p.process_id
 WHERE list_contains(runs, b.run_id) AND b.start_ns > n.created_ns + 1_000_000_000
-    AND (u.topic_name = '/parameter_events' OR ends_with(u.topic_name, '/_action/status'))
+    AND (
+        u.topic_name = '/parameter_events'
+        -- Of goals that are known, the sending is told.
+        OR ends_with(u.topic_name, '/_action/status')
+        AND u.run_id NOT IN (SELECT run_id FROM main.goal)
+    )
 UNION ALL
 SELECT
     g.run_id, 'goal',

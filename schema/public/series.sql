@@ -60,7 +60,10 @@ SELECT
     o.run_id, o.owner, o.object_id, o.node, o.subject, o.process_id,
     coalesce(o.host_id, p.host_id) AS host_id,
     o.topic_name, o.is_internal, o.is_timer,
-    min(o.object_id) OVER (PARTITION BY o.run_id, o.owner, o.node, o.subject) AS series_id
+    CASE
+        WHEN o.owner = 'program' THEN o.object_id
+        ELSE min(o.object_id) OVER (PARTITION BY o.run_id, o.owner, o.node, o.subject)
+    END AS series_id
 FROM object AS o
 LEFT JOIN main.process AS p ON o.process_id = p.process_id
 WHERE list_contains(runs, o.run_id) AND o.subject IS NOT NULL

@@ -1,6 +1,6 @@
 -- description: Timers and topics that are called or published far faster than usual for a moment:
 --     in less than a fifth of the median period each, and five times more than are due, so that
---     what catches up after a pause is none.
+--     not what catches up after a pause.
 -- grain: one row per series
 -- param: series_values
 -- column: run_id

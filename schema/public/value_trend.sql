@@ -70,7 +70,7 @@ SELECT
 FROM line AS l
 JOIN coarse AS c ON l.what = c.what AND l.series_id = c.series_id
 WHERE abs(after - l.base) > main.least_change(l.what)
-    AND greatest(l.base / after, after / l.base) > 1.3
+    AND greatest(l.base, after) > 1.3 * least(l.base, after)
 GROUP BY ALL
 HAVING sum((c.value - l.base - l.slopes[2] * (c.at_ns - l.at_ns)) ** 2) < (
     SELECT min(s.error)

@@ -81,7 +81,7 @@ def test_offset_and_drift_are_recovered(drifting: Simulation, direct: Path) -> N
     # The shortest messages come at other moments, where what is left of the drift counts.
     assert beta["uncertainty_ns"] <= 1.01 * (there + back) / 2
     assert abs(beta["drift_ppb"] + 20_000) <= beta["drift_uncertainty_ppb"]
-    assert beta["drift_uncertainty_ppb"] <= 1.1 * (there + back) / 3
+    assert beta["drift_uncertainty_ppb"] <= 1.2 * (there + back) / 3
     assert there > 0
     assert back > 0
 

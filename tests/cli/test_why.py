@@ -82,7 +82,7 @@ def test_it_names_what_took_the_cpu(
     path = tmp_path / "traced.duckdb"
     shutil.copyfile(demo, path)
     with Database(demo) as database:
-        pieces = database.query("critical-path").table.to_pylist()
+        pieces = database.why().slow_flow.table.to_pylist()
     longest = max((row for row in pieces if row["callback_instance_id"]), key=_duration)
     assert 2 * longest["duration_ns"] > longest["latency_ns"]
     with duckdb.connect(str(path)) as connection:

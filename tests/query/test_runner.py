@@ -681,9 +681,12 @@ def test_what_a_recording_has_follows_from_rows(
         for name in tables:
             con.execute(
                 f"CREATE TABLE {name} (kind VARCHAR, thread_count BIGINT, topic_name VARCHAR, "
-                "is_topic_learned BOOLEAN, end_ns BIGINT)"
+                "is_topic_learned BOOLEAN, end_ns BIGINT, continues_id BIGINT)"
             )
         for row in rows:
-            values = ["kind", "thread_count", "topic_name", "is_topic_learned", "end_ns"]
-            con.execute(f"INSERT INTO {table} VALUES (?, ?, ?, ?, ?)", [*map(row.get, values)])
+            values = [
+                "kind", "thread_count", "topic_name", "is_topic_learned", "end_ns", "continues_id"
+            ]  # fmt: skip
+            marks = ", ".join("?" * len(values))
+            con.execute(f"INSERT INTO {table} VALUES ({marks})", [*map(row.get, values)])
         assert {name for name, has in recorded(con).items() if has} == facts

@@ -7,7 +7,7 @@ from support.rules import derived
 
 STAGE = """
 CREATE TABLE store.host AS SELECT 1 AS host_id, 1 AS clock_id;
-CREATE TABLE store.process AS SELECT 1 AS process_id, 1 AS host_id;
+CREATE TABLE store.process AS SELECT 1 AS process_id, 1 AS host_id, 1 AS last_seen_ns;
 CREATE TABLE store.publisher AS SELECT 1 AS publisher_id, '/a' AS topic_name;
 CREATE TABLE store.publication AS
 SELECT 1 AS run_id, 1 AS publication_id, 1 AS publisher_id, 1 AS process_id, 1 AS thread_id,

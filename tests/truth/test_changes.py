@@ -215,7 +215,7 @@ def test_a_moment_has_what_changed_ran_and_was_slow(recorded: Path) -> None:
     with msgflow.open_db(recorded) as opened:
         moment = opened.why(at=f"{SLOWER + 0.3}s")
         calm = opened.why(at="4s")
-    assert moment.headline.startswith("/slower: duration of Subscription(/slower): 5.5")
+    assert moment.headline.startswith("/slower: duration of Subscription(/slower): 5.4")
     assert f"since {SLOWER:.1f}" in moment.headline
     (duration, *_) = moment.sections["changes"].table.to_pylist()
     assert (duration["what"], duration["node"]) == ("duration", "/slower")

@@ -54,7 +54,7 @@ def test_changes_are_marked_and_lead_to_the_timeline(
     way: str, changing: Path, serve: Serve, report: Callable[..., str], page: Page
 ) -> None:
     known = changes(changing)
-    assert {row["what"] for row in known} == {"timer", "topic"}
+    assert {row["what"] for row in known} == {"timer", "topic", "take"}
     page.open(serve(changing).address if way == "served" else report(changing))
     # The first page says it, and draws it.
     section = page.page.locator("section", has_text="When it changed")
@@ -109,7 +109,7 @@ def test_what_happened_is_marked_on_every_axis_of_time(
     assert [(mark["at"], mark["color"]) for mark in marks if "active" in mark["text"]] == [
         (SECOND // 2, "active")
     ]
-    assert any("cc1 (pid 1) used 0.5 CPUs" in mark["text"] for mark in marks)
+    assert any("cc1 used 0.5 CPUs" in mark["text"] for mark in marks)
     assert page.page.evaluate("msgflow.page.minimap.marks") == marks
     page.page.wait_for_function("() => msgflow.bar.marks.length > 0")
     assert page.page.evaluate("msgflow.bar.marks") == marks
@@ -130,7 +130,7 @@ def counters(page: Page) -> dict[str, list[float]]:
     return found
 
 
-def test_counters_have_rows(changing: Path, dropping: Path, serve: Serve, page: Page) -> None:
+def test_counters_have_rows(changing: Path, demo: Path, serve: Serve, page: Page) -> None:
     page.open(f"{serve(changing).address}#/timeline?from=0&to=1000000000")
     page.page.wait_for_function("() => msgflow.page.renderer.counters.size > 0")
     shown = counters(page)
@@ -147,15 +147,15 @@ def test_counters_have_rows(changing: Path, dropping: Path, serve: Serve, page: 
     assert any(values[:1] == pytest.approx([100], rel=0.05) for values in rates.values())
     assert "show=rate" in page.page.url
     # Where several messages wait, their number has a row.
-    page.open(f"{serve(dropping).address}#/timeline")
+    page.open(f"{serve(demo).address}#/timeline")
     page.page.wait_for_function("() => msgflow.page.renderer.counters.size > 0")
-    with open_db(dropping) as opened:
+    with open_db(demo) as opened:
         ((longest,),) = opened.connection.execute(
             "SELECT max(value) FROM counter([1], 0, 9223372036854775807)"
             " JOIN subscription ON object_id = subscription_id"
             " WHERE kind = 'queue' AND NOT is_internal"
         ).fetchall()
-    assert longest == 2
+    assert longest > 1
     assert f"queue ≤ {longest:.3g} messages" in counters(page)
 
 

@@ -55,12 +55,15 @@ def test_paths(way: str, demo: Path, serve: Serve, report: Report, page: Page, r
     wanted = [
         [
             row["path"],
+            # A line over time.
+            "",
             *(shown(row[name]) for name in durations),
             *(f"{row[name]:,}" for name in counts),
             *(format_cell(row[name] or "") for name in reasons),
         ]
         for row in latency
     ]
+    page.page.locator("th", has_text="over time").first.wait_for()
     assert cells(page, "paths") == wanted
     chosen = latency[0]["path"]
     breakdown = [row for row in parts if row["path"] == chosen]

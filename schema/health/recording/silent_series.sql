@@ -15,7 +15,7 @@ unexplained AS (
             max(object_id) AS object_id
         FROM known
         GROUP BY owner, series_id
-    ) AS k ON t.object_id = k.object_id AND (t.what = 'topic') = (k.owner = 'publisher')
+    ) AS k ON t.object_id = k.object_id AND k.owner = CASE t.what WHEN 'topic' THEN 'publisher' ELSE 'callback' END
     WHERE t.process_id NOT IN (SELECT process_id FROM derive.hanging_callback)
         AND NOT EXISTS (
             FROM silent AS s
@@ -36,6 +36,16 @@ unexplained AS (
             WHERE s.process_id = t.process_id
                 AND ends_with(s.service_name, '/_action/get_result')
                 AND abs(r.sent_ns - t.at_ns) < t.near_ns
+        )
+        -- All who heard it ended then.
+        AND NOT coalesce(
+            (
+                SELECT max(p.last_seen_ns)
+                FROM main.subscription AS s
+                JOIN main.process AS p ON s.process_id = p.process_id
+                WHERE t.what = 'topic' AND s.run_id = t.run_id AND s.topic_name = t.topic_name
+            ) BETWEEN t.at_ns - t.near_ns AND t.at_ns + t.near_ns,
+            false
         )
 )
 SELECT
@@ -58,7 +68,7 @@ SELECT
             ''
         ),
         coalesce(
-            'within a second: ' || (
+            printf('within %s: ', main.duration_text(t.near_ns)) || (
                 SELECT
                     array_to_string(
                         list(

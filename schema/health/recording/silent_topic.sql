@@ -2,7 +2,7 @@
 -- description: The node published on the topic at regular times, and from some moment on until the
 --     end of the recording not once, for ten of its periods and a second at least. Its process goes
 --     on, so do the callbacks that it has, and nothing in the trace shows that it had to stop: it
---     names what began or ended within a second.
+--     names what began or ended then.
 -- cause: A loop or thread of the node ended or waits (a driver, a controller), the node changed
 --     what it does, or its input comes from where nothing is traced.
 -- cure: None needed if the node means to. Else see what it waits for: its output, and gdb -p PID,

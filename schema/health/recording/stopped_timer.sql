@@ -1,7 +1,7 @@
 -- title: A timer that stopped
 -- description: The timer was called at regular times, and from some moment on until the end of the
 --     recording not once, for ten of its periods and a second at least. Its process goes on, and
---     nothing in the trace shows that it had to stop: it names what began or ended within a second.
+--     nothing in the trace shows that it had to stop: it names what began or ended then.
 -- cause: It was cancelled, or destroyed (ROS has no event for that), its callback group waits for a
 --     lock or a callback of another thread, or the executor has lost it (ros2/rclcpp#3240).
 -- cure: None needed if the node cancels it. Else see what its callback waited for last, and what

@@ -13,7 +13,7 @@ LEFT JOIN series AS s
     AND s.owner = CASE
         WHEN w.what IN ('duration', 'CPU time', 'timer') THEN 'callback'
         WHEN w.what = 'topic' THEN 'publisher'
-        WHEN w.what IN ('wait', 'queue', 'take') THEN 'subscription'
+        WHEN w.what IN ('wait', 'queue', 'take', 'loss') THEN 'subscription'
         WHEN w.what = 'CPU use' THEN 'program'
     END
 LEFT JOIN named_path AS p ON w.what = 'latency' AND w.series_id = p.path_id

@@ -6,9 +6,12 @@
 WITH named AS (
     SELECT
         *,
-        subject || CASE
+        CASE WHEN what = 'take' AND kind NOT IN ('step', 'trend') THEN 'taking ' ELSE '' END
+        || coalesce(subject, '?')
+        || CASE
             WHEN node IS NULL THEN ''
             WHEN what IN ('wait', 'queue', 'loss') THEN ' for ' || node
+            WHEN what = 'take' THEN ' by ' || node
             ELSE ' of ' || node
         END AS whose
     FROM change
@@ -59,7 +62,12 @@ SELECT
             WHEN c.kind = 'burst' THEN printf('%d more of %s, %s', c.count, c.whose, c.change)
             ELSE printf(
                 '%s of %s: %s',
-                CASE WHEN c.what IN ('timer', 'topic') THEN 'period' ELSE c.what END,
+                CASE c.what
+                    WHEN 'timer' THEN 'period'
+                    WHEN 'topic' THEN 'period'
+                    WHEN 'take' THEN 'time between takes'
+                    ELSE c.what
+                END,
                 c.whose, c.change
             )
         END AS sentence,

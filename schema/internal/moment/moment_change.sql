@@ -33,8 +33,8 @@ SELECT
         CASE WHEN what <> 'timer' THEN what || ' of ' ELSE '' END,
         subject,
         CASE kind
-            WHEN 'step' THEN change || printf(' since %.3g s', (at_ns - $run_start_ns) / 1e9)
-            WHEN 'stop' THEN printf('none since %.3g s', (at_ns - $run_start_ns) / 1e9)
+            WHEN 'step' THEN change || printf(' since %.1f s', (at_ns - $run_start_ns) / 1e9)
+            WHEN 'stop' THEN printf('none since %.1f s', (at_ns - $run_start_ns) / 1e9)
             WHEN 'trend' THEN change || ' during the run'
             ELSE kind || ' of ' || change
         END

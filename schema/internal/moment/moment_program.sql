@@ -4,22 +4,12 @@
 -- param: at_ns BIGINT  The moment, epoch ns
 -- column: program VARCHAR  Its name
 -- column: cpus DOUBLE  CPUs that it used
-WITH used AS (
-    SELECT
-        coalesce(name, '?') AS program,
-        sum(running_ns) / 1e9 AS cpus
-    FROM main.cpu_usage
-    WHERE list_contains($runs, run_id) AND tid <> 0
-        AND start_ns BETWEEN $at_ns - 999_999_999 AND $at_ns
-    GROUP BY ALL
-    UNION ALL
-    SELECT program, cpus
-    FROM main.program_use($runs)
-    WHERE at_ns <= $at_ns
-    QUALIFY row_number() OVER (PARTITION BY program_id ORDER BY at_ns DESC) = 1
-)
-SELECT program, cpus
-FROM used
-WHERE cpus > 0.05
+SELECT
+    program,
+    sum(cpu_ns / (end_ns - start_ns)) AS cpus
+FROM main.program_cpu($runs)
+WHERE start_ns <= $at_ns AND end_ns > $at_ns
+GROUP BY host_id, process_id, program
+HAVING cpus > 0.05
 ORDER BY cpus DESC, program
 LIMIT 5

@@ -154,7 +154,7 @@ SELECT
     s.is_stage,
     s.end_ns - s.start_ns AS took_ns,
     s.node,
-    CASE WHEN s.id = 'sent' THEN a.name ELSE m.what END AS what,
+    CASE WHEN s.is_stage AND s.start_ns IS NULL THEN a.name ELSE m.what END AS what,
     m.function, m.share
 FROM stage AS s
 CROSS JOIN asked AS a

@@ -37,8 +37,8 @@ CREATE OR REPLACE MACRO derive.clock_limit() AS {
     -- Nearly all messages of a publisher come so soon after the begin of their write; as many come
     -- no sooner than the others.
     'usual_quantile': 0.99,
-    -- Where others publish on the topic, three times what half of the messages take is too late, and
-    -- a third of what nearly all take at least is too soon.
+    -- Where others publish on the topic, three times what half of the messages take is too late,
+    -- and a third of what nearly all take at least is too soon.
     'usual_factor': 3,
     -- The right difference explains at least this share of the messages of some topic. It need not
     -- of every topic: publishers may be missing.

@@ -2,10 +2,11 @@
 --     its publication was written, and before the publishing thread went on; all writes on the
 --     topic that go on at that moment come into question, or go on within the slack of the clocks.
 --     A message has one publication and a publication one message, the first. A message has no
---     publication where that would be a guess: where several come into question; where two messages
---     may both be of one publication, and come as soon as usual; where others publish on the topic,
---     and it came later or sooner than is usual; where its clock was set, or the difference of the clocks is
---     not known or explains less than half of the messages of each topic.
+--     publication where that would be a guess: where several come into question; where two
+--     messages may both be of one publication, and come as soon as usual; where others publish
+--     on the topic, and it came later or sooner than is usual; where its clock was set, or the
+--     difference of the clocks is not known or explains less than half of the messages of each
+--     topic.
 -- grain: one row per message that has, or might have, a publication
 -- when: derive.unstamped_call
 CREATE OR REPLACE MACRO derive.nearest_message(only_run) AS TABLE

@@ -30,5 +30,5 @@ SELECT o.run_id, o.process_id, o.node_id, o.what, o.object_id, o.topic_name, o.l
 FROM object AS o
 JOIN store.process AS p ON o.process_id = p.process_id
 QUALIFY o.number > 10
-    AND max(p.last_seen_ns) OVER (PARTITION BY p.host_id) - o.last_ns
+    AND max(p.last_seen_ns) OVER (PARTITION BY o.run_id, p.host_id) - o.last_ns
         > greatest(10 * (o.last_ns - o.first_ns) / (o.number - 1), 1_000_000_000)
