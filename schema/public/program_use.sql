@@ -23,7 +23,9 @@ WITH used AS (
 program AS (
     SELECT
         run_id, host_id, process_id, program,
-        coalesce(process_id, -row_number() OVER (ORDER BY run_id, host_id, program, process_id)) AS program_id,
+        coalesce(
+            process_id, -row_number() OVER (ORDER BY run_id, host_id, program, process_id)
+        ) AS program_id,
         count(DISTINCT pid) AS processes
     FROM used
     WHERE NOT is_recorder

@@ -15,7 +15,9 @@ unexplained AS (
             max(object_id) AS object_id
         FROM known
         GROUP BY owner, series_id
-    ) AS k ON t.object_id = k.object_id AND k.owner = CASE t.what WHEN 'topic' THEN 'publisher' ELSE 'callback' END
+    ) AS k
+        ON t.object_id = k.object_id
+        AND k.owner = CASE t.what WHEN 'topic' THEN 'publisher' ELSE 'callback' END
     WHERE t.process_id NOT IN (SELECT process_id FROM derive.hanging_callback)
         AND NOT EXISTS (
             FROM silent AS s
