@@ -142,7 +142,7 @@ CREATE OR REPLACE TEMP TABLE change_occasion AS
 SELECT
     c.change_id, o.sentence,
     abs(o.at_ns - c.at_ns) AS apart_ns,
-    len(o.nodes) = 0 AND contains(o.sentence, ' CPU') AS is_load,
+    o.kind = 'program' AS is_load,
     CASE
         WHEN list_has_any(o.nodes, c.nodes) THEN 1
         WHEN list_has_any(o.topics, list_concat(c.takes, c.gives)) THEN 2

@@ -1,4 +1,4 @@
-"""Timers and topics that stop, as the findings of these names have them: told once."""
+"""Timers and topics that stop, as the findings of these names have them: each is said once."""
 
 from __future__ import annotations
 

@@ -153,7 +153,7 @@ JOIN main.process AS p ON n.process_id = p.process_id
 WHERE list_contains(runs, b.run_id) AND b.start_ns > n.created_ns + 1_000_000_000
     AND (
         u.topic_name = '/parameter_events'
-        -- Of goals that are known, the sending is told.
+        -- Where goals are recorded, the next rows have them.
         OR ends_with(u.topic_name, '/_action/status')
         AND u.run_id NOT IN (SELECT run_id FROM main.goal)
     )

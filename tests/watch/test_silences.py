@@ -1,4 +1,4 @@
-"""What stops while a system is watched is told, once."""
+"""A timer or topic stops while msgflow watches: it says so once."""
 
 from __future__ import annotations
 

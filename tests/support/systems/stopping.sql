@@ -10,8 +10,8 @@
 -- 9 /hangs: its timer, while a callback has no end.
 -- 10 /simulated: its timer, with /clock.
 -- 11 /rare: its timer stops half a second before the end.
--- 12 /irregular: /now_and_then, in bursts; /anew, of which another publisher goes on; and /late, which
--- began 15 s after its process.
+-- 12 /irregular: /now_and_then comes in bursts. Another publisher of /anew goes on. /late began 15 s
+-- after its process.
 CREATE TEMP TABLE tick AS
 SELECT n, 50_000_000 * n AS at_ns FROM range(1, 400) AS r (n);
 
