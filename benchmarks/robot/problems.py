@@ -200,7 +200,7 @@ PAIRS = {
         ("service", "hog"),
     ),
     "drone": (("service", "sometimes"), ("restart", "timer")),
-    "picker": (("action", "lock"), ("over", "depth1")),
+    "picker": (("action", "disk"), ("over", "depth1")),
     "vehicle": (("action", "sometimes"),),
     "worker": (),
     "c_worker": (),

@@ -2,7 +2,8 @@
 -- description: The paths that an explanation may blame. Those with heartbeats
 --     (derive.heartbeat_topic) are not among them, unless there is nothing else or the caller asks
 --     for a place. How old the data at the end of a path are counts from each root to the first
---     arrival of it or of a newer one: a message that is lost costs the time until the next one.
+--     arrival of it or of a newer one: a message that is lost costs the time until the next one,
+--     unless a reader is not there by then.
 -- grain: one row per printed path
 -- reads: path_outcome, named_path
 -- param: place VARCHAR  Where the flows end; NULL: anywhere
@@ -34,18 +35,25 @@ chosen AS (
     FROM judged
     WHERE $place IS NOT NULL OR NOT is_plumbing OR (SELECT bool_and(is_plumbing) FROM judged)
 ),
-root AS (
+outcome AS (
     SELECT
-        c.path, o.root_ns, o.latency_ns,
-        o.root_ns - lag(o.root_ns) OVER in_time AS period_ns,
-        min(CASE WHEN o.status = 'reached' THEN o.sink_ns END) OVER (
-            in_time ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING
-        ) - o.root_ns AS age_ns
+        c.path, o.status, o.root_ns, o.sink_ns, o.latency_ns,
+        count(*) FILTER (WHERE o.status = 'not_connected')
+            OVER (PARTITION BY c.path ORDER BY o.root_ns) AS connection
     FROM path_outcome AS o
     JOIN chosen AS c ON o.path_id = c.path_id
     WHERE o.is_first IS NOT FALSE
-        AND o.status IN ('reached', 'superseded', 'dropped', 'lost')
-    WINDOW in_time AS (PARTITION BY c.path ORDER BY o.root_ns)
+),
+root AS (
+    SELECT
+        path, root_ns, latency_ns,
+        root_ns - lag(root_ns) OVER (PARTITION BY path ORDER BY root_ns) AS period_ns,
+        min(CASE WHEN status = 'reached' THEN sink_ns END) OVER (
+            PARTITION BY path, connection ORDER BY root_ns
+            ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING
+        ) - root_ns AS age_ns
+    FROM outcome
+    WHERE status IN ('reached', 'superseded', 'dropped', 'lost')
 )
 SELECT
     path,
