@@ -104,8 +104,8 @@ docs: $(VENV)/.installed
 
 $(VENV)/.made:
 	@! command -v $(PYTHON) >/dev/null 2>&1 \
-		|| $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
-		|| { echo 'msgflow needs Python 3.11 or newer; name one: make PYTHON=python3.12 ...' >&2; exit 1; }
+		|| $(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' \
+		|| { echo 'msgflow needs Python 3.10 or newer; name one: make PYTHON=python3.12 ...' >&2; exit 1; }
 	@$(APT); command -v $(PYTHON) >/dev/null 2>&1 || apt_install python3 python3-venv
 	@$(APT); $(PYTHON) -m venv $(VENV) 2>/dev/null \
 		|| { rm -rf $(VENV); apt_install python3-venv; $(PYTHON) -m venv $(VENV); }
@@ -141,6 +141,7 @@ chromium:
 ros: $(VENV)/.made
 	@$(HAS_LTTNG) || { $(APT); apt_install lttng-tools liblttng-ust-dev gcc libc6-dev || true; }
 	@command -v perf >/dev/null || { $(APT); apt_install linux-perf || true; }
+	@test -x /usr/sbin/sshd || { $(APT); apt_install openssh-server openssh-client || true; }
 	@test $(VENV)/ros/.installed -nt pyproject.toml || { \
 		$(BIN)/python -m venv --clear --without-pip $(VENV)/ros \
 		&& $(PIP) --python $(VENV)/ros/bin/python $(INSTALL) --group ros \

@@ -104,7 +104,7 @@ def recorded(directory: str | Path, name: str = "test") -> Iterator[RecordedData
     database = RecordedDatabase(place / "msgflow.duckdb")
     with (
         session_daemon(with_kernel=False, note=warnings.warn),
-        recording_session(session, trace, Channel(), with_kernel=False),
+        recording_session(session, trace, Channel()),
         pytest.MonkeyPatch.context() as patch,
     ):
         for variable, value in with_python_nodes(warnings.warn).items():

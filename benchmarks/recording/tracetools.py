@@ -2,17 +2,19 @@
 
 The wheels of ROS 2 on PyPI call the tracepoints of `libtracetools.so`. Theirs is linked with an
 LTTng of 2016, which no session daemon of today accepts. This one has the same functions, and takes
-its place if it is loaded first.
+its place if it is loaded first: `python benchmarks/recording/tracetools.py DIRECTORY`, then
+`LD_PRELOAD=DIRECTORY/libtracetools.so`. It needs gcc and the headers of LTTng-UST.
 """
 
 from __future__ import annotations
 
 import subprocess
-import tomllib
+import sys
 from pathlib import Path
 from typing import Any
 
 import msgflow
+from msgflow.backports import tomllib
 
 # What the wheels of Kilted have.
 VERSION = (8, 6, 0)
@@ -146,3 +148,9 @@ def _functions(name: str, fields: list[dict[str, Any]]) -> str:
             ", " + (version if each["name"] == "version" else each["name"]) for each in fields
         ),
     )
+
+
+if __name__ == "__main__":
+    target = Path(sys.argv[1]).absolute()
+    target.mkdir(parents=True, exist_ok=True)
+    print(f"export LD_PRELOAD={build_tracetools(target)}")

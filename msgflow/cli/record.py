@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,7 +19,7 @@ from msgflow.cli.output import (
     print_result,
     print_status,
 )
-from msgflow.errors import ExitCode, NoFlowError
+from msgflow.errors import ExitCode, NoFlowError, TraceError
 from msgflow.files.default_files import DEFAULT_DATABASE
 from msgflow.run.choice import require_run_name
 
@@ -39,6 +39,8 @@ def command(
     kernel: bool = False,
     profile: str | None = None,
     dual: str | None = None,
+    on: list[str] | None = None,
+    network: bool = False,
     events: list[str] | None = None,
     without: Annotated[list[str] | None, typer.Option()] = None,
     python: bool = True,
@@ -47,7 +49,7 @@ def command(
     subbuf_size: str = "1M",
     num_subbuf: Annotated[int, typer.Option(min=2)] = 4,
     links: Path | None = None,
-    clock_sync: str = "none",
+    clock_sync: str | None = None,
     ingest: bool = True,
     database: Path = DEFAULT_DATABASE,
 ) -> None:
@@ -64,13 +66,15 @@ def command(
         kernel: Also record the scheduler, with LTTng or perf: why a thread waits.
         profile (HZ): Also sample functions with perf: 99, or 99:dwarf.
         dual (SESSION): Also write this snapshot session: nodes that run already.
+        on (HOST): Also record on this machine, by ssh, or in container:NAME; repeatable.
+        network: Also record packets with LTTng's kernel modules: clocks of machines come closer.
         without (EVENT): Leave out events, such as rclcpp_executor_wait_for_work; repeatable.
         python: Trace callbacks and executors of Python nodes of COMMAND.
         cpu_time: Read the clocks of threads where perf_event_open is allowed: what computes.
         print_python_path: Only print the folder that does so, in front of PYTHONPATH.
         subbuf_size (SIZE): Size of a sub-buffer of LTTng, per CPU.
         num_subbuf: Number of sub-buffers, per CPU.
-        clock_sync (messages|FILE): As msgflow ingest has it.
+        clock_sync (messages|FILE): As msgflow ingest has it; with --on, messages.
         ingest: Read the recording into the database.
     """
     from msgflow.cli import check
@@ -84,6 +88,7 @@ def command(
     from msgflow.record.perf import read_rate
     from msgflow.record.program import PYTHON_NODES
     from msgflow.record.recording import record
+    from msgflow.record.remote import read_places
     from msgflow.record.session import EVENTS, Channel
     from msgflow.result.layout import screen_width
     from msgflow.run.slice import Slice
@@ -93,6 +98,8 @@ def command(
         return
     name = name or time.strftime("recording-%Y%m%d-%H%M%S")
     require_run_name(name)
+    places = read_places(on or [])
+    clock_sync = clock_sync or ("messages" if places else "none")
     # What is wrong with the files is said now, and not when all is recorded.
     if links is not None:
         read_links(links)
@@ -115,18 +122,26 @@ def command(
             python=python,
             profile=None if profile is None else read_rate(profile),
             cpu_time=cpu_time,
+            places=places,
+            network=network,
             note=print_note,
             show=show,
         )
     print_status(f"recorded into {target}: {_words(recorded.last)}")
     if program and recorded.exit_code:
         print_note(f"{program[0]} ended with exit code {recorded.exit_code}")
-    has_failed = bool(recorded.exit_code)
+    has_failed = bool(recorded.exit_code or recorded.lost)
+    if not recorded.last.event_bytes:
+        raise TraceError(
+            f"no event of ROS 2 was recorded — {target}",
+            "nodes have to run while it records, with tracing built in: ros2 run tracetools status",
+        )
     if ingest:
         # What is wrong is printed by check.
         ingest_command.command(
             [str(target)],
             name=name,
+            host=[f"{host}={place}" for host, place in recorded.hosts.items()],
             together=True,
             events=events or [],
             links=links,
@@ -140,19 +155,25 @@ def command(
         except typer.Exit:  # of errors in the recording, which it has printed
             has_failed = True
         with Database(database) as opened:
-            # Where no flow arrives there are no paths: that is said below.
-            with suppress(NoFlowError):
-                verdict = opened.why(run=name).verdict
+            try:
+                found = opened.why(run=name)
+            except NoFlowError:
+                # There are no paths: that is said below.
+                times = Slice(name)
+                run = times.one_run(opened.connection, "a recording")
+                course = read_course(opened.connection, run, times)
+            else:
                 command_of = partial(_command, database)
                 whole = command_of(["why", "--wide"])
-                print_lines(culprit_lines(verdict, command_of, screen_width(), whole=whole))
-            times = Slice(name)
-            run = times.one_run(opened.connection, "a recording")
-            print_lines(read_course(opened.connection, run, times).picture())
+                print_lines(culprit_lines(found.verdict, command_of, screen_width(), whole=whole))
+                course = found.course
+            print_lines(course.picture())
             latencies = opened.query("e2e-latency", run=name)
             print_result(latencies)
             for sentence in part_of_latencies(opened, latencies):
                 print_status(sentence)
+    if recorded.is_cut:
+        raise typer.Exit(ExitCode.TRACE)
     if has_failed:
         raise typer.Exit(ExitCode.FAILED)
 

@@ -62,7 +62,7 @@ def recorded_cpu_time(
         if (reason := why_not()) is None:
             place.mkdir()
             try:
-                session = recording_session(f"{name}-cpu", place, clocks, with_kernel=False)
+                session = recording_session(f"{name}-cpu", place, clocks)
                 stack.enter_context(session)
             except RecordingError as error:
                 reason = error.message

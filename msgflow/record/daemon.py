@@ -11,6 +11,7 @@ from typing import IO
 
 from msgflow.errors import RecordingError
 from msgflow.record.lttng import is_daemon_running, sessions
+from msgflow.sql.interrupt import noted_interrupts
 
 _LONGEST_START = 10.0
 _LONGEST_END = 20.0
@@ -71,8 +72,10 @@ def _wait_for_others(note: Callable[[str], None]) -> None:
     if others := sessions():
         names = ", ".join(session.name for session in others)
         note(f"other sessions use the session daemon that was started here; it waits for: {names}")
-        while sessions():
-            time.sleep(_BETWEEN_LOOKS)
+        with noted_interrupts() as interrupts:
+            while sessions():
+                interrupts.check()
+                time.sleep(_BETWEEN_LOOKS)
 
 
 def _wait_until_it_answers(daemon: subprocess.Popen[str], words: IO[str]) -> None:

@@ -80,7 +80,7 @@ def _measured(channel: Channel) -> float:
             if not child.stdout.readline():
                 raise ValueError("no library")
             name = f"msgflow-cost-{mark()}"
-            with recording_session(name, directory, only, with_kernel=False):
+            with recording_session(name, directory, only):
                 child.stdin.write("\n")
                 child.stdin.flush()
                 return float(child.stdout.readline())

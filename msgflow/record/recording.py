@@ -12,22 +12,29 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from msgflow.errors import RecordingError
+from msgflow.errors import RecordingError, UsageError
 from msgflow.record.cpu_time import DIRECTORY, recorded_cpu_time
 from msgflow.record.daemon import session_daemon
 from msgflow.record.event_cost import measure_event_cost
-from msgflow.record.lttng import losses, process_with_library, ros_processes, sessions
-from msgflow.record.perf import recorded_samples, recorded_with_perf
+from msgflow.record.lttng import (
+    has_wheel,
+    is_daemon_running,
+    process_with_library,
+    ros_processes,
+    sessions,
+)
+from msgflow.record.perf import KERNEL_EVENTS, recorded_samples, recorded_with_perf
 from msgflow.record.program import (
     Program,
     require_program,
     with_python_functions,
     with_python_nodes,
 )
+from msgflow.record.remote import HOSTS, Place, fetched, sessions_on
 from msgflow.record.session import (
+    NETWORK_EVENTS,
     Channel,
     can_trace_kernel,
-    is_there,
     record_snapshot,
     recording_session,
     remove_leftovers,
@@ -37,7 +44,7 @@ from msgflow.record.session import (
 )
 from msgflow.record.system_samples import sampled
 from msgflow.sql.interrupt import noted_interrupts, until_interrupted
-from msgflow.trace.ctf.packet_index import content_bytes
+from msgflow.trace.ctf.packet_index import written
 
 if TYPE_CHECKING:
     from msgflow.record.perf import Rate
@@ -61,9 +68,7 @@ class Status:
     seconds: float  # since it began
     # Bytes of all events on the disk, without the clocks of threads; others are still in buffers.
     event_bytes: int
-    # Events for which the buffers were too small; 0 where events are left out, since LTTng says
-    # nothing before the end.
-    discarded: int
+    discarded: int  # events for which the buffers were too small, as far as packets say so
     free_bytes: int  # of the disk
 
 
@@ -75,6 +80,10 @@ class Recorded:
     last: Status  # how it was at the last look
     # Of the program that was recorded, if it ended by itself; None without one.
     exit_code: int | None
+    # The session daemon of LTTng ended before the recording did: what was in buffers is missing.
+    is_cut: bool
+    hosts: dict[str, Path]  # where the recordings of other places are
+    lost: tuple[str, ...]  # places whose recording did not come
 
 
 def record(
@@ -90,6 +99,8 @@ def record(
     python: bool = True,
     profile: Rate | None = None,
     cpu_time: bool = True,
+    places: Sequence[Place] = (),
+    network: bool = False,
     note: Callable[[str], None],
     show: Callable[[Status], None],
 ) -> Recorded:
@@ -99,16 +110,19 @@ def record(
     prints, if it prints anything; None is our stderr. `snapshot` is a snapshot session that has the
     initialisation of nodes that run already; what it has is written too. `python` also traces
     callbacks and executors of the program's nodes of rclpy. `cpu_time` also records the clocks of
-    threads. `note` gets sentences about what is wrong with the recording. `show` gets the status
-    twice a second; what it raises ends the recording. After Ctrl-C or SIGTERM nothing of the
+    threads. `places` are where else to record. `network` also records when packets come and go.
+    `note` gets sentences about what is wrong with the recording. `show` gets the status twice a
+    second; what it raises ends the recording. After Ctrl-C or SIGTERM nothing of the
     recording stays but what is written.
     """
     if program:
         require_program(program[0])
+    if not all(map(str.strip, (*channel.events, *channel.without))):
+        raise UsageError("an event has no name", "--events 'my_pkg:*'")
     require_name(name)
     _require_room(directory, note, seconds)
     with noted_interrupts() as interrupts, ExitStack() as stack:
-        stack.enter_context(session_daemon(with_kernel=kernel, note=note))
+        stack.enter_context(session_daemon(with_kernel=kernel or network, note=note))
         for left in remove_leftovers():
             note(f"the session of a recording that was killed is removed: {left}")
         require_new(name)
@@ -116,15 +130,25 @@ def record(
             _note_running(note)
         else:
             require_snapshot(snapshot)
+        elsewhere = stack.enter_context(sessions_on(places, name, channel, with_network=network))
         directory.mkdir(parents=True, exist_ok=True)
         if snapshot is not None:
             record_snapshot(snapshot, directory / "snapshot")
         # What is measured are events: other sessions would have them, too.
         if not sessions():
             measure_event_cost(directory, channel)
-        by_lttng = kernel and can_trace_kernel()
-        if kernel and not by_lttng:
-            stack.enter_context(recorded_with_perf(directory, note))
+        of_kernel: list[str] = []
+        if kernel or network:
+            by_lttng = can_trace_kernel()
+            if by_lttng:
+                of_kernel = [
+                    *(KERNEL_EVENTS if kernel else ()),
+                    *(NETWORK_EVENTS if network else ()),
+                ]
+            elif network:
+                note("network packets are not recorded here: they need LTTng's kernel modules")
+            if kernel and not by_lttng:
+                stack.enter_context(recorded_with_perf(directory, note))
         if profile is not None:
             samples = recorded_samples(directory, profile, is_ours=bool(program), note=note)
             stack.enter_context(samples)
@@ -142,7 +166,8 @@ def record(
             with (
                 # Clocks of all events: they begin before these, and end after them.
                 clocks if cpu_time else nullcontext(),
-                recording_session(name, directory, channel, with_kernel=by_lttng),
+                fetched(elsewhere, directory, note) as lost_places,
+                recording_session(name, directory, channel, of_kernel=of_kernel),
             ):
                 interrupts.check()
                 if program:
@@ -155,11 +180,18 @@ def record(
                 with until_interrupted():
                     while not watch.is_over(started, seconds):
                         interrupts.check()
+                        lost_places()
                         time.sleep(_BETWEEN_LOOKS)
             ended_with = None if started is None else started.exit_code
         # All buffers are written now.
-        last = replace(watch.status, event_bytes=recorded_bytes(directory))
-    return Recorded(directory, last, ended_with)
+        if not directory.exists():
+            raise _removed(directory)
+        size, discarded = recorded_packets(directory)
+        last = replace(watch.status, event_bytes=size, discarded=discarded)
+    lost = lost_places()
+    come = [place.name for place in places if place.name not in lost]
+    hosts = {host: directory / HOSTS / host for host in come}
+    return Recorded(directory, last, ended_with, watch.is_cut, hosts, tuple(lost))
 
 
 @contextmanager
@@ -195,6 +227,7 @@ class _Watch:
     show: Callable[[Status], None]
     expects_nodes: bool
     has_failed: bool = False
+    is_cut: bool = False
     begin: float = field(default_factory=time.monotonic)
     # Seconds after which nodes are looked for.
     next_look: float = _BETWEEN_LOOKS_FOR_NODES
@@ -206,17 +239,23 @@ class _Watch:
     def is_over(self, program: Program | None, seconds: float | None) -> bool:
         """Look, and tell whether the recording has to end."""
         try:
-            self._look()
-        except RecordingError as error:
-            is_gone = False
-            with suppress(RecordingError):
-                is_gone = not is_there(self.name)
-            if is_gone:
+            if not is_daemon_running():
+                self.is_cut = True
                 self.note(
-                    f"the session {self.name} was destroyed by another program, or its daemon"
-                    " ended: the recording ends here"
+                    "the session daemon of LTTng ended: the recording ends here, and what was in"
+                    " buffers is missing"
                 )
                 return True
+            if all(session.name != self.name for session in sessions()):
+                self.note(
+                    f"the session {self.name} was destroyed by another program: the recording ends"
+                    " here"
+                )
+                return True
+            self._look()
+        except FileNotFoundError:
+            raise _removed(self.directory) from None
+        except RecordingError as error:
             # The recording goes on all the same: LTTng writes it.
             if not self.has_failed:
                 self.note(f"not everything about the recording is known: {error.message}")
@@ -232,11 +271,9 @@ class _Watch:
         before = self.status
         passed = time.monotonic() - self.begin
         free = shutil.disk_usage(self.directory).free
-        written = recorded_bytes(self.directory)
-        self.status = replace(before, seconds=passed, event_bytes=written, free_bytes=free)
-        # The daemon of LTTng 2.13 crashes when it lists a session that leaves events out.
-        if not self.channel.without:
-            self.status = replace(self.status, discarded=losses(self.name))
+        # Not by lttng list NAME: LTTng 2.13 dies of that where a session leaves events out.
+        size, discarded = recorded_packets(self.directory)
+        self.status = Status(passed, size, discarded, free)
         self.show(self.status)
         if self.status.discarded and not before.discarded:
             self.note(
@@ -262,20 +299,32 @@ class _Watch:
         elif self.loaded_by == before:
             self.expects_nodes = False
             self.note(
-                f"process {before} uses ROS 2 without tracepoints: is tracing built in (ros2 run"
-                " tracetools status)?"
+                f"process {before} has tracepoints of a wheel of PyPI, which cannot be recorded: in"
+                " a checkout of msgflow, python benchmarks/recording/tracetools.py DIR builds"
+                " others, for LD_PRELOAD=DIR/libtracetools.so (docs/record.md)"
+                if has_wheel(before)
+                else f"process {before} uses ROS 2 without tracepoints: is tracing built in (ros2"
+                " run tracetools status)?"
             )
 
 
-def recorded_bytes(directory: Path) -> int:
-    """Return the bytes of all packets of events, without what only fills them up."""
+def recorded_packets(directory: Path) -> tuple[int, int]:
+    """Return the bytes of all packets of events, without what only fills them up, and losses."""
     clocks = directory / DIRECTORY
     # A chunk of it may go away meanwhile: unlike others, this walk goes on.
-    return sum(
-        content_bytes(Path(folder, name))
+    found = [
+        written(Path(folder, name))
         for folder, _, names in os.walk(directory)
         for name in names
         if name.endswith(".idx") and not Path(folder).is_relative_to(clocks)
+    ]
+    return sum(size for size, _ in found), sum(lost for _, lost in found)
+
+
+def _removed(directory: Path) -> RecordingError:
+    return RecordingError(
+        f"the directory of the recording was removed — {directory}",
+        "record into another one (-o DIR), which no program removes",
     )
 
 

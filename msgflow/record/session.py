@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -12,13 +12,14 @@ from pathlib import Path
 from msgflow.errors import RecordingError, UsageError
 from msgflow.files.temporary_owner import is_abandoned, mark, remove_abandoned_directories
 from msgflow.record.lttng import is_daemon_running, lttng, sessions
-from msgflow.record.perf import KERNEL_EVENTS
 from msgflow.trace.regular_file import read_regular
 
 # Of ROS 2; of an instrumented DDS; of CARET; of Agnocast.
 EVENTS = ("ros2:*", "dds:*", "ros2_caret:*", "agnocast:*")
 """The events that a recording has."""
 CONTEXTS = ("vpid", "vtid", "procname")
+NETWORK_EVENTS = ("net_dev_queue", "net_if_receive_skb")
+"""Events of the kernel that tell when packets come and go."""
 _CHANNEL = "ros2"
 # In the directory of a recording while it is made: the mark of its process.
 _OWNER = ".msgflow-record"
@@ -43,9 +44,12 @@ class Channel:
 
 @contextmanager
 def recording_session(
-    name: str, directory: Path, channel: Channel, *, with_kernel: bool
+    name: str, directory: Path, channel: Channel, *, of_kernel: Sequence[str] = ()
 ) -> Iterator[None]:
-    """Record into a directory during the block; afterwards everything is written."""
+    """Record into a directory during the block; afterwards everything is written.
+
+    `of_kernel` are events of the kernel.
+    """
     owner = directory / _OWNER
     try:
         owner.write_text(mark())
@@ -63,10 +67,10 @@ def recording_session(
         _set_up("--userspace", name, channel)
         contexts = [f"--type={context}" for context in channel.contexts]
         lttng("add-context", *_to_channel("--userspace", name), *contexts)
-        if with_kernel:
+        if of_kernel:
             # All in one call.
-            of_kernel = replace(channel, events=(",".join(KERNEL_EVENTS),), without=())
-            _set_up("--kernel", name, of_kernel)
+            events = (",".join(of_kernel),)
+            _set_up("--kernel", name, replace(channel, events=events, without=()))
         if channel.rotation_ns is not None:
             _rotate(name, channel.rotation_ns)
         lttng("start", name)
@@ -76,7 +80,7 @@ def recording_session(
         # named: the next recording removes the session.
         if is_there(name):
             lttng("destroy", name)
-        owner.unlink()
+        owner.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -140,6 +144,11 @@ def require_name(name: str) -> None:
             f"a session cannot have a name with a slash, or with - in front — {name}",
             "another --name; -o DIR names the directory",
         )
+    # LTTng writes it as it is, and what it says is no XML then.
+    if not name.isprintable():
+        raise UsageError(
+            f"a session cannot have a name with a control character — {name!r}", "another --name"
+        )
 
 
 def require_new(name: str) -> None:
@@ -165,10 +174,14 @@ def _set_up(domain: str, name: str, channel: Channel) -> None:
     buffers = ("--buffers-pid",) if channel.is_per_process else ()
     lttng("enable-channel", domain, f"--session={name}", *sizes, *buffers, _CHANNEL)
     for event in channel.events:
-        # LTTng refuses what the event does not have.
-        out = [each for each in channel.without if fnmatchcase(each, event)]
+        out = left_out(channel, event)
         without = [f"--exclude={','.join(out)}"] if out else []
         lttng("enable-event", *_to_channel(domain, name), *without, event)
+
+
+def left_out(channel: Channel, event: str) -> list[str]:
+    """Return what a channel leaves out of an event: LTTng refuses what that does not have."""
+    return [each for each in channel.without if fnmatchcase(each, event)]
 
 
 def _to_channel(domain: str, name: str) -> tuple[str, ...]:

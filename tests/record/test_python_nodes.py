@@ -249,6 +249,12 @@ JOBS = """
         for _ in callbacks:
             executor.spin_once()
 
+    channel = queue.Queue()
+
+    def loop():
+        while channel.get():
+            work()
+
 """
 
 
@@ -595,12 +601,6 @@ def test_a_thread_that_callbacks_feed_has_a_job_of_each(robot: Robot) -> None:
     run_jobs(
         robot,
         """
-        channel = queue.Queue()
-
-        def loop():
-            while channel.get():
-                work()
-
         def started(message):
             threading.Thread(target=loop, daemon=True).start()
 
@@ -637,12 +637,6 @@ def test_what_its_program_takes_out_of_a_queue_leaves_the_later_ones(robot: Robo
     run_jobs(
         robot,
         """
-        channel = queue.Queue()
-
-        def loop():
-            while channel.get():
-                work()
-
         def heard(message):
             channel.put(message)
 
@@ -998,6 +992,83 @@ def test_a_robot_runs_without_what_is_missing(robot: Robot, what: str) -> None:
     assert "callback_start" not in "".join(robot.traced())
 
 
+NAMELESS = {
+    "coroutine": "async def later(): pass\n    executor.create_task(later())",
+    "raises": """
+    class Odd:
+        def __getattribute__(self, name):
+            return 1 / 0 if name == "__qualname__" else super().__getattribute__(name)
+        def __call__(self, message): print(message)
+    heard = Odd()
+    """,
+    "no string": "heard.__module__ = 5",
+}
+
+
+@pytest.mark.parametrize("what", NAMELESS)
+def test_what_has_no_name_is_traced(robot: Robot, what: str) -> None:
+    code = f"    {NAMELESS[what].strip()}\n{ONE_MESSAGE}"
+    if what == "coroutine":
+        code += "    executor.spin_once()\n"
+    assert robot.run(code, traced=False) == (0, "hello\nover\n", "")
+    assert robot.run(code) == (0, "hello\nover\n", "")
+    assert [line for line in robot.traced() if "callback" in line][-2:] == [
+        "callback_start 7",
+        "callback_end 7",
+    ]
+
+
+@pytest.mark.parametrize("place", ["_number_of", "_turn_to", "_function", "_job"])
+def test_what_a_signal_handler_raises_within_the_tracer_is_of_the_program(
+    robot: Robot, place: str
+) -> None:
+    """The signal comes when the tracer looks for a name, as it may at any place."""
+    code = f"""
+        import signal, sys, threading
+
+        class Late(Exception):
+            pass
+
+        def on_alarm(number, frame):
+            raise Late("too late")
+
+        def heard(message):
+            timer = threading.Timer(9, print)
+            timer.start(); timer.cancel()
+
+        signal.signal(signal.SIGALRM, on_alarm)
+        def alarm(frame, event, argument):
+            if frame.f_code.co_name == "{place}":
+                sys.setprofile(None)
+                signal.raise_signal(signal.SIGALRM)
+
+        entity = subscription.Subscription(7, lambda message: heard(message))
+        executor.ready = [(entity, ["lost"]), (entity, ["heard"])]
+        sys.setprofile(alarm)
+        try:
+            executor.spin_once()
+        except Late as error:
+            print(error)
+        finally:
+            sys.setprofile(None)
+        executor.tasks.clear()
+        executor.ready = [(entity, ["heard"])]
+        executor.spin_once()
+    """
+    exit_code, out, errors = robot.run(code)
+    assert (exit_code, out, errors) == (0, "too late\nover\n", "")
+    assert robot.traced().count("callback_start 7") > 0
+
+
+def test_a_tracer_that_turns_itself_off_says_so_in_the_trace(robot: Robot) -> None:
+    robot.run("""
+        import sys
+        subscription.Subscription(7, heard)
+        sys.modules["_msgflow_rclpy"]._turn_off(ValueError("a reason"))
+    """)
+    assert robot.lines("#msgflow off") == ["register 0 #msgflow off a reason"]
+
+
 @pytest.mark.parametrize("name", ["_msgflow_rclpy.py", "sitecustomize.py"])
 def test_a_robot_runs_although_the_tracer_raises(robot: Robot, name: str) -> None:
     robot.nodes = robot.directory / "nodes"
@@ -1023,6 +1094,59 @@ def test_another_sitecustomize_runs_as_ever(robot: Robot) -> None:
     traced = robot.run(code)
     assert traced == robot.run(code, traced=False)
     assert traced[1].startswith(f"mine {others}/sitecustomize.py {others} {FAKE}")
+
+
+@pytest.mark.parametrize("is_link", [True, False])
+def test_a_process_has_one_tracer(robot: Robot, is_link: bool) -> None:
+    """Two ways to it: by a link, as lib64, or in two installations."""
+    second = robot.directory / "second"
+    if is_link:
+        second.symlink_to(PYTHON_NODES)
+    else:
+        shutil.copytree(PYTHON_NODES, second)
+    assert robot.run(ONE_MESSAGE) == (0, "hello\nover\n", "")
+    once = robot.traced()
+    robot.trace.unlink()
+    robot.environment["PYTHONPATH"] = f"{second}{os.pathsep}{FAKE}"
+    assert robot.run(ONE_MESSAGE) == (0, "hello\nover\n", "")
+    assert robot.traced() == once
+
+
+def test_a_module_that_was_looked_for_is_traced_when_it_loads(robot: Robot) -> None:
+    robot.environment["PYTHONPATH"] = f"{robot.directory}{os.pathsep}{FAKE}"
+    (robot.directory / "usercustomize.py").write_text(
+        "import importlib.util; [importlib.util.find_spec('rclpy.executors') for _ in 'abc']"
+    )
+    assert robot.run(ONE_MESSAGE) == (0, "hello\nover\n", "")
+    assert "callback_start 7" in robot.traced()
+
+
+# Of the versions that pyenv has.
+OLD = [
+    found
+    for version in ("2.7", "3.6", "3.7")
+    for found in Path.home().glob(f".pyenv/versions/{version}.*/bin/python{version}")
+]
+
+
+@pytest.mark.parametrize("python", OLD, ids=lambda path: path.name)
+def test_a_python_that_is_too_old_runs_as_ever(tmp_path: Path, python: Path) -> None:
+    (tmp_path / "sitecustomize.py").write_text("import sys; sys.stdout.write('mine ')")
+    (tmp_path / "rclpy").mkdir()
+    for name in ("__init__", "executors"):
+        (tmp_path / "rclpy" / f"{name}.py").touch()
+    code = "import json, rclpy.executors, sys; print(sys.path[1:3])"
+    untraced, traced = (
+        subprocess.run(
+            [python, "-c", code],
+            env={"PYTHONPATH": os.pathsep.join(path), "PYTHONDONTWRITEBYTECODE": "1"},
+            capture_output=True,
+            text=True,
+        )
+        for path in ([str(tmp_path)], [str(PYTHON_NODES), str(tmp_path)])
+    )
+    assert (untraced.returncode, untraced.stdout[:4]) == (0, "mine")
+    assert (traced.returncode, traced.stdout, traced.stderr) == (0, untraced.stdout, "")
 
 
 @pytest.mark.parametrize("option", ["-S", "-I"])

@@ -20,7 +20,9 @@ def test_the_kernel_is_recorded_without_contexts(
     said: list[tuple[str, ...]] = []
     monkeypatch.setattr(session, "lttng", lambda *words: said.append(words))
     monkeypatch.setattr(session, "is_there", lambda name: True)
-    with recording_session("robot", tmp_path, Channel(("ros2:*",), "1M", 4), with_kernel=True):
+    of_kernel = ["sched_switch", "sched_waking"]
+    channel = Channel(("ros2:*",), "1M", 4)
+    with recording_session("robot", tmp_path, channel, of_kernel=of_kernel):
         pass
     assert [words[1] for words in said if words[0] == "enable-channel"] == [
         "--userspace",
@@ -34,7 +36,7 @@ def test_the_kernel_is_recorded_without_contexts(
         "--type=procname",
     )
     (events,) = (w[-1] for w in said if w[:2] == ("enable-event", "--kernel"))
-    assert "sched_switch" in events.split(",")
+    assert events == "sched_switch,sched_waking"
     assert [words[0] for words in said][-2:] == ["start", "destroy"]
 
 
@@ -45,7 +47,7 @@ def test_events_are_left_out_of_the_patterns_that_have_them(
     monkeypatch.setattr(session, "lttng", lambda *words: said.append(words))
     monkeypatch.setattr(session, "is_there", lambda name: True)
     channel = Channel(("ros2:*", "dds:*"), "1M", 4, without=("ros2:a", "ros2:b"))
-    with recording_session("robot", tmp_path, channel, with_kernel=False):
+    with recording_session("robot", tmp_path, channel):
         pass
     enabled = [words[3:] for words in said if words[0] == "enable-event"]
     assert [words[1:] for words in enabled] == [

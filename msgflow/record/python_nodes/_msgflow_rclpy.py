@@ -20,6 +20,7 @@ begin with `#msgflow`:
 * `#msgflow collect GENERATION` of nanoseconds: so long Python has just collected garbage on the
   thread.
 * `#msgflow thread NAME` of 0: the name that Python has for the thread, before its first callback.
+* `#msgflow off REASON` of 0: from here on this process is not traced so.
 
 An interrupt that comes while Python collects garbage is raised in what runs next. Where that is the
 function here, Python only prints it; rclpy shuts its context down all the same.
@@ -34,6 +35,7 @@ import inspect
 import itertools
 import os
 import queue
+import signal
 import sys
 import threading
 import time
@@ -50,6 +52,7 @@ _ANNOUNCED = {
 }
 # What these modules run on threads goes on for many callbacks.
 _MACHINERY = ("asyncio", "concurrent", "logging", "multiprocessing", "rclpy")
+_NAMES = ("__module__", "__qualname__")
 _KINDS = {"SingleThreadedExecutor": "single_threaded", "MultiThreadedExecutor": "multi_threaded"}
 
 _is_on = True
@@ -183,9 +186,20 @@ def wrap_node(node):
             _turn_off(error)
 
 
+def _pass_on_signal(error):
+    """Raise what a signal handler of the program raised while it interrupted the tracer."""
+    handlers = [_code_of(signal.getsignal(number)) for number in signal.valid_signals()]
+    at = error.__traceback__
+    while at is not None:
+        if at.tb_frame.f_code in handlers:
+            raise error
+        at = at.tb_next
+
+
 def _turn_off(error):
     """Leave rclpy as it was, and say why."""
     global _is_on, _is_recorded
+    _pass_on_signal(error)
     if not _is_on:
         return
     _is_on = _is_recorded = False
@@ -197,6 +211,8 @@ def _turn_off(error):
         gc.callbacks.remove(_collect)
     try:
         reason = (str(error) or type(error).__name__).splitlines()[0]
+        if _is_announced:
+            _register(0, "#msgflow off " + reason)
         sys.stderr.write("msgflow: this process runs without traced callbacks: %s\n" % reason)
     except Exception:
         pass
@@ -240,12 +256,21 @@ def _register_source(number, source):
 
 
 def _source(callback):
+    try:
+        code = _code_of(callback)
+    except Exception as error:
+        _pass_on_signal(error)
+        code = None
+    return "%s:%d" % (code.co_filename, code.co_firstlineno) if inspect.iscode(code) else ""
+
+
+def _code_of(callback):
+    """Return the code of a function or frame; None if it is not of Python."""
     while isinstance(callback, functools.partial):
         callback = callback.func
     code = getattr(callback, "__code__", None) or getattr(callback, "f_code", None)
     # An object that can be called has the function of its class.
-    code = code or getattr(type(callback).__dict__.get("__call__"), "__code__", None)
-    return "%s:%d" % (code.co_filename, code.co_firstlineno) if inspect.iscode(code) else ""
+    return code or getattr(type(callback).__dict__.get("__call__"), "__code__", None)
 
 
 def _begin_anew():
@@ -375,10 +400,15 @@ def _numbered(symbol, origin, callback=None, source=""):
 def _symbol(callback):
     while isinstance(callback, functools.partial):
         callback = callback.func
-    # An object may answer everything, but not with a name.
-    if not isinstance(getattr(callback, "__qualname__", None), str):
-        callback = type(callback)
-    return "%s:%s" % (callback.__module__, callback.__qualname__)
+    try:
+        module, name = callback.__module__, callback.__qualname__
+    except Exception as error:
+        _pass_on_signal(error)
+        module = name = None
+    # An object, also a coroutine, may answer anything, or raise.
+    if not (isinstance(name, str) and isinstance(module, str)):
+        module, name = (type.__dict__[each].__get__(type(callback)) for each in _NAMES)
+    return "%s:%s" % (module, name)
 
 
 def _start(number, step, goes_on=b"#msgflow resume"):
@@ -412,7 +442,8 @@ def _end(number, step, begin_ns):
 def _cpu_time_ns():
     try:
         return time.thread_time_ns()
-    except Exception:  # There is no such clock.
+    except Exception as error:  # There is no such clock.
+        _pass_on_signal(error)
         return 0
 
 
@@ -466,8 +497,8 @@ def _starts(original):
                 # One that runs already cannot be started.
                 if self.ident is None:
                     _start_as_job(self)
-            except Exception:  # A thread like no other.
-                pass
+            except Exception as error:  # A thread like no other.
+                _pass_on_signal(error)
         return original(self)
 
     return start
@@ -514,7 +545,8 @@ def _job(function, named=None, is_thread=False):
 
         run._msgflow_job = function
         return functools.update_wrapper(run, function, updated=())
-    except Exception:  # A function like no other.
+    except Exception as error:  # A function like no other.
+        _pass_on_signal(error)
         return function
 
 
@@ -562,8 +594,8 @@ def _puts(original):
                 step = (_thread.step or _new_step()) if _thread.calls else 0
                 put = (id(item), threading.get_ident(), step, _origin())
                 _handed_by(self, len(self.queue) - 1).known.append(put)
-            except Exception:  # A queue like no other.
-                pass
+            except Exception as error:  # A queue like no other.
+                _pass_on_signal(error)
 
     return _put
 
@@ -580,8 +612,8 @@ def _got(original):
                     identity, thread, *by = handed.known.popleft()
                     if identity == id(item) and thread != threading.get_ident():
                         _thread.handed = by
-            except Exception:
-                pass
+            except Exception as error:
+                _pass_on_signal(error)
         return item
 
     return _get
@@ -599,8 +631,8 @@ def _gets(original):
         item = original(self, *args, **kwargs)
         try:
             _receive(self, sys._getframe(1), *_thread.handed)
-        except Exception:
-            pass
+        except Exception as error:
+            _pass_on_signal(error)
         return item
 
     return get
@@ -703,7 +735,8 @@ def _awaited(coroutine):
             coroutine = coroutine.cr_await
         future = coroutine.gi_frame.f_locals.get("self")
         return future if _is_pending(future) else None
-    except Exception:
+    except Exception as error:
+        _pass_on_signal(error)
         return None
 
 
@@ -735,6 +768,8 @@ def _wait_for_ready_callbacks(original):
             # What its thread got before is over: now it works for all.
             if not _thread.depth:
                 _end_job()
+                # An exception may have come before a callback began.
+                _thread.calls = ()
             # A callback that spins is in a thread of a pool all the same.
             _thread.is_spinning = _thread.is_spinning or not _thread.depth
             _work_for(self)

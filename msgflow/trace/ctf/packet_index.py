@@ -69,16 +69,18 @@ def entries(stream_file: Path) -> dict[int, IndexEntry]:
     return found
 
 
-def content_bytes(index: Path) -> int:
-    """Return the bytes of all packets in an index, without what fills them up; 0 if it is damaged.
+def written(index: Path) -> tuple[int, int]:
+    """Return the bytes of all packets in an index, without what fills them up, and its losses.
 
-    The index may still grow.
+    The losses are events that the stream had lost up to its latest packet. Both are 0 if the index
+    is damaged; it may still grow.
     """
     try:
-        content = read_regular(index, None)
+        found = list(_entries(read_regular(index, None)))
     except OSError:
-        return 0
-    return sum(entry.content_bits for entry in _entries(content)) // 8
+        found = []
+    lost = found[-1].discarded if found else 0
+    return sum(entry.content_bits for entry in found) // 8, lost or 0
 
 
 def first_counter(directory: Path, class_id: int, instance_id: int) -> int | None:

@@ -3,7 +3,8 @@
 --     the function of a callback begins (`source`), that something will go on later because of what
 --     runs (`step`), that the next callback of the thread is what goes on (`resume`; `job`: on a
 --     thread of no executor), the CPU time of what has just ended (`cpu`) and the duration of a
---     collection of garbage that has (`collect`) [ns], and how Python calls a thread (`thread`).
+--     collection of garbage that has (`collect`) [ns], how Python calls a thread (`thread`), and
+--     why it traces the process no longer (`off`).
 --     The tracer registers a callback that never runs, whose symbol says it.
 -- grain: one row per such event
 -- when: raw.ros2_rclcpp_callback_register WHERE symbol LIKE '#msgflow %'
