@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from random import Random
 
-from msgflow.replay.predict import Change
+from msgflow.replay.change import Change
 from msgflow_sim.entity import (
     MILLISECOND,
     SECOND,
@@ -18,7 +18,7 @@ from msgflow_sim.entity import (
 )
 from msgflow_sim.system import Executor, Host, Node, Process, Scenario
 
-CHANGES = ("executor", "threads", "duration", "depth", "period")
+CHANGES = ("executor", "threads", "duration", "depth", "period", "phase", "reacts")
 """Kinds of changes."""
 KINDS = ("humble", "jazzy", "rclpy")
 """What systems run."""
@@ -143,27 +143,21 @@ def _node(member: _Member, random: Random) -> Node:
     )
 
 
-def changes_of(scenario: Scenario, random: Random) -> Iterator[tuple[Change, Scenario]]:
-    """Yield a change of each kind that makes sense, with the system that has it."""
+def changes_of(
+    scenario: Scenario, random: Random, places: int = 2
+) -> Iterator[tuple[Change, Scenario]]:
+    """Yield changes that make sense, so many of each kind, with the system that has each."""
     for kind in CHANGES:
-        places = [
+        chosen = [
             (process, node)
             for process in scenario.processes
             for node in process.nodes
             if _may_change(kind, process, node)
         ]
-        if places:
-            process, node = random.choice(places)
+        for process, node in random.sample(chosen, min(places, len(chosen))):
             value, made = _MADE[kind](process, node)
-            yield (
-                Change(kind, node.full_name, value),
-                replace(
-                    scenario,
-                    processes=tuple(
-                        made if each is process else each for each in scenario.processes
-                    ),
-                ),
-            )
+            processes = tuple(made if each is process else each for each in scenario.processes)
+            yield Change(kind, node.full_name, value), replace(scenario, processes=processes)
 
 
 def _may_change(kind: str, process: Process, node: Node) -> bool:
@@ -177,6 +171,11 @@ def _may_change(kind: str, process: Process, node: Node) -> bool:
         return any(each.depth > 1 for each in node.subscriptions)
     if kind == "period":
         return bool(node.timers)
+    if kind == "phase":
+        # The whole process starts later.
+        return bool(node.timers) and sum(len(each.timers) for each in process.nodes) == 1
+    if kind == "reacts":
+        return any(each.kind == "periodic_async" for each in node.links)
     return True
 
 
@@ -217,10 +216,31 @@ def _period(process: Process, node: Node) -> tuple[float, Process]:
     return period, _with(process, node, replace(node, timers=(replace(timer, period_ns=period),)))
 
 
-_MADE: dict[str, Callable[[Process, Node], tuple[float, Process]]] = {
+def _phase(process: Process, node: Node) -> tuple[float, Process]:
+    later = node.timers[0].period_ns * 2 // 5
+    return later, replace(process, start_ns=process.start_ns + later)
+
+
+def _reacts(process: Process, node: Node) -> tuple[str, Process]:
+    """What its timer does is done at the end of each message of its first topic."""
+    (timer,) = node.timers
+    first, *others = node.subscriptions
+    work = replace(timer.work, typical_ns=timer.work.typical_ns + first.work.typical_ns)
+    changed = replace(
+        node,
+        timers=(),
+        links=(),
+        subscriptions=(replace(first, publishes=timer.publishes, work=work), *others),
+    )
+    return first.topic, _with(process, node, changed)
+
+
+_MADE: dict[str, Callable[[Process, Node], tuple[float | str, Process]]] = {
     "executor": _own_executor,
     "threads": _threads,
     "duration": _duration,
     "depth": _depth,
     "period": _period,
+    "phase": _phase,
+    "reacts": _reacts,
 }

@@ -23,22 +23,33 @@ _NEVER = 1 << 62
 class _Message:
     """A message in a queue."""
 
-    __slots__ = ("at", "number", "origins")
+    __slots__ = ("at", "number", "origins", "serial")
 
-    def __init__(self, number: int, at: int, origins: list[Origin]) -> None:
+    def __init__(self, number: int, at: int, origins: list[Origin], serial: int = 0) -> None:
         self.number = number
         self.at = at
         self.origins = origins
+        self.serial = serial
+
+
+class _Group:
+    """Callbacks that exclude each other; `needed`: for so long they do others."""
+
+    __slots__ = ("is_busy", "needed")
+
+    def __init__(self) -> None:
+        self.is_busy = False
+        self.needed = 0
 
 
 class _Task:
     """A callback that is replayed: what waits for it."""
 
-    __slots__ = ("busy", "callback", "due", "period", "queue")
+    __slots__ = ("callback", "due", "group", "period", "queue")
 
-    def __init__(self, callback: Callback, busy: list[bool] | None) -> None:
+    def __init__(self, callback: Callback, group: _Group | None) -> None:
         self.callback = callback
-        self.busy = busy
+        self.group = group
         self.queue: deque[_Message] = deque(maxlen=callback.depth or None)
         self.period = callback.period
         self.due = callback.origin
@@ -47,7 +58,7 @@ class _Task:
         return self.due <= time if self.period is not None else bool(self.queue)
 
     def is_free(self) -> bool:
-        return self.busy is None or not self.busy[0]
+        return self.group is None or not self.group.is_busy
 
 
 class _Spinner:
@@ -58,6 +69,7 @@ class _Spinner:
         "description",
         "is_looking",
         "line",
+        "needed",
         "ready",
         "since",
         "sleeps",
@@ -74,22 +86,32 @@ class _Spinner:
         self.arrived: deque[tuple[int, _Task]] = deque()
         self.is_looking = False
         self.line = 0
+        self.needed = 0
         self.sleeps = False
         self.since = 0
         self.wake_at: int | None = None
 
 
 class Replay:
-    """One replay of a system; `latencies` has how long the flows of each path took."""
+    """One replay of a system; `latencies` has how long the flows of each path took.
+
+    Attributes:
+        ran: what ran: callback, when its thread looked for it, begin, end, when its thread was
+            free, and the place in `sent` of its message, from 1 (0: it took none).
+        sent: what was published: the publication that it repeats, when, and the place in `ran` of
+            what published it, from 1 (0: nothing that is replayed).
+    """
 
     def __init__(self, system: System) -> None:
+        self.ran: list[tuple[int, int, int, int, int, int]] = []
+        self.sent: list[tuple[int, int, int]] = []
         self._system = system
         self._agenda: list[tuple[int, int, Callable[..., None], tuple[Any, ...]]] = []
         self._order = count()
         self._roots = count()
         self._first: dict[tuple[int, int], int] = {}
         self._spinners = {key: _Spinner(each) for key, each in system.executors.items()}
-        groups: dict[object, list[bool]] = defaultdict(lambda: [False])
+        groups: dict[object, _Group] = defaultdict(_Group)
         self._tasks = {
             key: _Task(each, None if each.group is None else groups[each.executor, each.group])
             for key, each in system.callbacks.items()
@@ -133,6 +155,19 @@ class Replay:
             taken[path].append(latency)
         return taken
 
+    def loads(self) -> dict[int, float]:
+        """Return by executor what share of the time of its threads its callbacks needed.
+
+        One group may need all the time of one thread.
+        """
+        loads = {}
+        for key, spinner in self._spinners.items():
+            description = spinner.description
+            needed = [spinner.needed / description.threads]
+            needed += [task.group.needed for task in spinner.tasks if task.group is not None]
+            loads[key] = max(needed) / max(1, self._system.end - description.start)
+        return loads
+
     def _at(self, time: int, action: Callable[..., None], *arguments: Any) -> None:
         heappush(self._agenda, (time, next(self._order), action, arguments))
 
@@ -161,8 +196,11 @@ class Replay:
         """Something is there: a wait ends soon, if there is one."""
         if not spinner.sleeps:
             return
-        usual = spinner.description.waking
-        at = max(spinner.since + usual, time + (usual if waking is None else waking))
+        description = spinner.description
+        at = time + (description.waking if waking is None else waking)
+        if time <= spinner.since:
+            # It was there before: the thread does not fall asleep.
+            at = spinner.since + description.polling
         if spinner.wake_at is None or at < spinner.wake_at:
             spinner.wake_at = at
             self._at(at, self._go_on, spinner)
@@ -206,8 +244,8 @@ class Replay:
 
     def _begin(self, time: int, spinner: _Spinner, task: _Task) -> None:
         """A thread has chosen a callback, which then begins."""
-        if task.busy is not None:
-            task.busy[0] = True
+        if task.group is not None:
+            task.group.is_busy = True
         key, at = 0, time
         if task.period is not None:
             key, at = _turn(task), task.due
@@ -227,12 +265,14 @@ class Replay:
         """A callback begins: it takes its message, publishes, and ends."""
         callback = task.callback
         origins: list[Origin] = []
+        serial = 0
         if task.period is None:
             if not task.queue:
                 self._end(time, spinner, task)
                 return
             message = task.queue.popleft()
             key, at, origins = message.number, message.at, message.origins
+            serial = message.serial
         gathered, fires, outputs = self._fill(callback.subscription, origins)
         instance = callback.instances.get(key)
         is_own = instance is not None and (
@@ -244,6 +284,12 @@ class Replay:
             self._end(time, spinner, task)
             return
         end = time + int(instance.duration * callback.factor)
+        looked, free = time - instance.before, end + instance.after
+        spinner.needed += free - looked
+        if task.group is not None:
+            task.group.needed += free - looked
+        self.ran.append((callback.number, looked, time, end, free, serial))
+        place = len(self.ran)
         root: list[Origin] | None = None
         for sent in instance.sent:
             made = list(origins)
@@ -255,11 +301,18 @@ class Replay:
             if not made and callback.subscription is None:
                 root = root or [(next(self._roots), time, None)]
                 made = root
-            self._send(time + int(sent.offset * callback.factor), sent, made, is_own)
+            at = time + int(sent.offset * callback.factor)
+            self._send(at, sent, made, is_own, place)
         self._arrived(end, origins)
         for number in self._inputs.get(callback.subscription or 0, ()):
             self._kept[number][callback.subscription or 0].append((end, origins))
-        self._at(end + instance.after, self._end, spinner, task)
+        if callback.awaited:
+            # Its thread is free before; what its group excludes is not.
+            free = end - int((end - time) * callback.awaited)
+            self._at(free + instance.after, self._look, spinner)
+            self._at(end, self._leave, spinner, task)
+        else:
+            self._at(end + instance.after, self._end, spinner, task)
 
     def _fill(
         self, subscription: int | None, origins: list[Origin]
@@ -308,26 +361,38 @@ class Replay:
 
     def _end(self, time: int, spinner: _Spinner, task: _Task) -> None:
         """A thread is done with a callback."""
-        if task.busy is not None:
-            task.busy[0] = False
-            self._wake(time, spinner, None)
+        self._leave(time, spinner, task)
         self._look(time, spinner)
 
-    def _publish_outside(self, time: int, sent: Sent) -> None:
-        self._send(time, sent, [(next(self._roots), time, None)], is_own=True)
+    def _leave(self, time: int, spinner: _Spinner, task: _Task) -> None:
+        """Others of the group of a callback may run."""
+        if task.group is not None:
+            task.group.is_busy = False
+            self._wake(time, spinner, None)
 
-    def _send(self, time: int, sent: Sent, origins: list[Origin], is_own: bool) -> None:
+    def _publish_outside(self, time: int, sent: Sent) -> None:
+        self._send(time, sent, [(next(self._roots), time, None)], is_own=True, ran=0)
+
+    def _send(self, time: int, sent: Sent, origins: list[Origin], is_own: bool, ran: int) -> None:
         """A message is under way to all that get it."""
+        self.sent.append((sent.number, time, ran))
+        serial = len(self.sent)
         steps = self._system.steps
         for key, delay in sent.delays.items():
-            task = self._tasks[key]
+            task = self._tasks.get(key)
+            if task is None:
+                continue
             subscription = task.callback.subscription or 0
-            led = {
-                (root, begin, step): None
-                for root, begin, chain in origins
-                if (step := steps.get((chain, sent.publisher, subscription))) is not None
-            }
-            message = _Message(sent.number if is_own else 0, time, list(led))
+            if sent.publisher < 0:
+                # A request or response, which is a step of no chain.
+                led = dict.fromkeys(origins)
+            else:
+                led = {
+                    (root, begin, step): None
+                    for root, begin, chain in origins
+                    if (step := steps.get((chain, sent.publisher, subscription))) is not None
+                }
+            message = _Message(sent.number if is_own else 0, time, list(led), serial)
             self._at(time + delay, self._arrive, task, message)
 
     def _arrive(self, time: int, task: _Task, message: _Message) -> None:

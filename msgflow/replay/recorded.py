@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from statistics import median, median_low
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,7 @@ from msgflow.replay.system import (
     System,
 )
 from msgflow.sql.statement import internal_sql
+from msgflow.text.values import short_symbol
 
 if TYPE_CHECKING:
     import duckdb
@@ -30,6 +32,10 @@ _KINDS = {"timer": 0, "subscription": 1, "service": 2}
 # How callbacks exclude each other where the recording does not name groups.
 NODE_GROUPS, OWN_GROUPS = "node", "callback"
 _INSTANCE = "replay_instance"
+# To look in vain takes some time, else threads would look without end.
+_LOOK_NS = 1_000
+# A wait that lasts so many times as long as usual did not find anything when it began.
+_MANY = 4
 _ROWS = (
     "replay_executor",
     "replay_callback",
@@ -42,11 +48,18 @@ _ROWS = (
 )
 
 
-def read_tables(connection: duckdb.DuckDBPyConnection, run: Run) -> dict[str, list[dict[str, Any]]]:
-    """Return the rows that a replay is made of, by the names of the statements."""
+def read_tables(
+    connection: duckdb.DuckDBPyConnection, run: Run, window: tuple[int, int]
+) -> dict[str, list[dict[str, Any]]]:
+    """Return the rows that a replay is made of, by the names of the statements.
+
+    `window`: only what began, or was published, from a time on and until another one.
+    """
     values = {
         "run_id": run.run_id,
         "runs": [run.run_id],
+        "begin_ns": window[0],
+        "until_ns": window[1],
         "from": None,
         "to": None,
         "skip_first": 0,
@@ -65,7 +78,7 @@ def read_tables(connection: duckdb.DuckDBPyConnection, run: Run) -> dict[str, li
 
 def recorded_system(
     tables: Mapping[str, Sequence[dict[str, Any]]],
-    end: int,
+    window: tuple[int, int],
     groups: str = NODE_GROUPS,
     *,
     forgets: bool = False,
@@ -77,6 +90,7 @@ def recorded_system(
     or each only itself. `forgets` is that of executors of several threads. `is_in_order` says that
     those of rclcpp without events of their own are events executors.
     """
+    begin, end = window
     instances = tables[_INSTANCE]
     executors = {row["executor_id"]: row for row in tables["replay_executor"]}
     callbacks = _callbacks(tables, groups)
@@ -93,7 +107,8 @@ def recorded_system(
     recorded: dict[int, list[int]] = defaultdict(list)
     numbers = {name: number for number, name in names.items()}
     for row in tables["fleet_flow"]:
-        if row["is_first"] and row["latency_ns"] is not None:
+        is_within = begin <= row["root_ns"] and (row["sink_ns"] or end) <= end
+        if row["is_first"] and row["latency_ns"] is not None and is_within:
             recorded[numbers[row["path"]]].append(row["latency_ns"])
     return System(
         system_executors,
@@ -109,7 +124,7 @@ def recorded_system(
         },
         {row["path_id"]: row["alike_id"] for row in paths if row["is_path"]},
         names,
-        _executors_of(paths, callbacks, made),
+        _passed(paths, callbacks),
         recorded,
         end,
     )
@@ -140,6 +155,7 @@ def _callbacks(tables: Mapping[str, Sequence[Row]], groups: str) -> dict[int, Ca
             (row["period_ns"] or None) if row["created_ns"] is not None else None,
             (row["created_ns"] or 0) + (row["period_ns"] or 0),
             rank=ranks[number],
+            symbol=None if row["symbol"] is None else short_symbol(row["symbol"]),
         )
     return callbacks
 
@@ -160,7 +176,7 @@ def _seen_together(instances: Iterable[Row], nodes: Mapping[int, str]) -> set[ob
     return apart
 
 
-def _ranks(rows: Sequence[Row], pairs: Iterable[Row]) -> dict[int, int]:
+def _ranks(rows: Sequence[Row], pairs: Iterable[Row]) -> dict[int, tuple[int, int, int]]:
     """Place of each callback in the order in which executors look: who came first of two tells.
 
     rclpy goes node by node, rclcpp kind by kind. What was never ready at once is in the order of
@@ -189,15 +205,10 @@ def _ranks(rows: Sequence[Row], pairs: Iterable[Row]) -> dict[int, int]:
         following = min(left, key=lambda each: sum(other in left for other in before[each]))
         places[following] = len(places)
         del left[following]
-    ordered = sorted(
-        units,
-        key=lambda each: (
-            0 if each in python else kinds[each],
-            places[units[each]],
-            kinds[each],
-        ),
-    )
-    return {number: rank for rank, number in enumerate(ordered)}
+    return {
+        number: (0 if number in python else kinds[number], places[unit], kinds[number])
+        for number, unit in units.items()
+    }
 
 
 def _estimate(instances: Sequence[dict[str, Any]], callbacks: Mapping[int, Callback]) -> None:
@@ -264,16 +275,20 @@ def _executors(
 ) -> dict[int, Executor]:
     """Return the executors, with what a wait needs to end: timers show it, that are due in one."""
     wakings: dict[int, list[int]] = defaultdict(list)
+    waits: dict[int, list[int]] = defaultdict(list)
     first: dict[int, int] = {}
     for row in instances:
         key = row["executor_id"]
         first.setdefault(key, row["looked_ns"])
+        if row["round_ns"] is not None:
+            waits[key].append(row["round_ns"] - row["wait_ns"])
         if row["callback_instance_id"] in timed and row["round_ns"] is not None:
             due = timed[row["callback_instance_id"]][1]
             if row["wait_ns"] < due < row["round_ns"]:
                 wakings[key].append(row["round_ns"] - due)
     every = [each for found in wakings.values() for each in found]
     usual = _short(every)
+    woken = {key: _short(wakings[key]) or usual for key in executors}
     return {
         key: Executor(
             EVENTS if is_in_order and may_be_in_order(row, python) else row["kind"],
@@ -281,8 +296,9 @@ def _executors(
             forgets or key in python,
             row["threads"],
             first.get(key, 0) if row["start_ns"] is None else row["start_ns"],
-            row["falling_ns"] or 0,
-            (_short(wakings[key]) or usual) if row["has_rounds"] else 0,
+            max(_LOOK_NS, row["falling_ns"] or 0),
+            woken[key] if row["has_rounds"] else 0,
+            min(woken[key], _short(waits[key])),
         )
         for key, row in executors.items()
     }
@@ -397,7 +413,8 @@ def _messages(
                 arrived[row["callback_instance_id"]] = row["arrived_ns"]
         elif key is not None:
             untaken.append((number, key))
-    found = _arrivals(instances, executors, by_instance, sent_by, sent_at, timed, arrived)
+    is_busy = _busy(instances, callbacks)
+    found = _arrivals(instances, executors, is_busy, by_instance, sent_by, sent_at, timed, arrived)
     delays: dict[tuple[int, int], list[int]] = defaultdict(list)
     for instance, (number, key) in by_instance.items():
         delay = found[instance] - sent_at[number]
@@ -411,9 +428,28 @@ def _messages(
     return outside
 
 
+def _busy(
+    instances: Iterable[Row], callbacks: Mapping[int, Callback]
+) -> Callable[[int, int], bool]:
+    """Return what says whether others of its group kept a callback from running at a time."""
+    runs: dict[object, list[tuple[int, int]]] = defaultdict(list)
+    for row in instances:
+        callback = callbacks[row["callback_id"]]
+        if callback.group is not None:
+            runs[callback.executor, callback.group].append((row["looked_ns"], row["end_ns"]))
+
+    def is_busy(number: int, time: int) -> bool:
+        known = runs.get((callbacks[number].executor, callbacks[number].group), [])
+        place = bisect_left(known, (time, 0)) - 1
+        return place >= 0 and known[place][1] >= time
+
+    return is_busy
+
+
 def _arrivals(
     instances: Sequence[Row],
     executors: Mapping[int, Executor],
+    is_busy: Callable[[int, int], bool],
     by_instance: Mapping[int, tuple[int, int]],
     sent_by: Mapping[int, Sent],
     sent_at: Mapping[int, int],
@@ -438,11 +474,20 @@ def _arrivals(
         # Not so near to a wait's end that a replay some ns earlier would find another one.
         margin = executor.waking // 2
         came: list[tuple[int, int]] = []
-        dues = []
+        wait = rows[0]["wait_ns"]
+        dues = [
+            timed[row["callback_instance_id"]][1]
+            for row in rows
+            if row["callback_instance_id"] in timed
+        ]
+        # So long that nothing can have been there when it began.
+        is_long = (
+            wait is not None
+            and end - wait > max(executor.waking, _MANY * executor.polling)
+            and min(dues, default=end) > wait
+        )
         for row in rows:
             number = row["callback_instance_id"]
-            if number in timed:
-                dues.append(timed[number][1])
             if number not in by_instance:
                 continue
             publication, callback = by_instance[number]
@@ -454,13 +499,15 @@ def _arrivals(
             is_alone = executor.threads == 1
             if is_alone and before is not None and last_round.get(callback) != before:
                 least = max(least, before + margin)
+            if is_long and not is_busy(callback, wait):
+                # It would have ended that wait at once.
+                least = max(least, wait + 1)
             if executor.kind == EVENTS:
                 least = max(least, last_arrival.get(-key, 0) + 1)
             guess = known.get(number, min(max(guess, least), max(at, end - margin)))
             came.append((guess, number))
             last_round[callback] = end
             last_arrival[callback] = last_arrival[-key] = guess
-        wait = rows[0]["wait_ns"]
         if came and wait is not None and min([*dues, *(each[0] for each in came)]) > wait:
             first, number = min(came)
             if not dues or first < min(dues):
@@ -503,24 +550,20 @@ def _usual_delays(
     return usual
 
 
-def _executors_of(
-    paths: Sequence[Row], callbacks: Mapping[int, Callback], made: Mapping[int, Instance]
-) -> dict[int, frozenset[int]]:
-    """The executors that each path passes."""
-    heard = {each.subscription: each.executor for each in callbacks.values() if each.subscription}
-    publishing = {
-        sent.publisher: callback.executor
-        for callback in callbacks.values()
-        for instance in callback.instances.values()
-        for sent in instance.sent
-    }
+def _passed(paths: Sequence[Row], callbacks: Mapping[int, Callback]) -> dict[int, frozenset[int]]:
+    """The callbacks that each path passes."""
+    heard = {each.subscription: each.number for each in callbacks.values() if each.subscription}
+    publishing: dict[int, set[int]] = defaultdict(set)
+    for callback in callbacks.values():
+        for instance in callback.instances.values():
+            for sent in instance.sent:
+                publishing[sent.publisher].add(callback.number)
     by_chain: dict[int, frozenset[int]] = {}
     passed: dict[int, frozenset[int]] = defaultdict(frozenset)
     for row in paths:
-        ends = heard.get(row["subscription_id"]), publishing.get(row["publisher_id"])
-        own = frozenset(each for each in ends if each is not None)
+        own = publishing[row["publisher_id"]] | {heard.get(row["subscription_id"])}
         before = by_chain.get(row["parent_path_id"], frozenset())
-        by_chain[row["path_id"]] = before | own
+        by_chain[row["path_id"]] = before | frozenset(each for each in own if each is not None)
         if row["is_path"]:
             passed[row["alike_id"]] |= by_chain[row["path_id"]]
     return dict(passed)

@@ -53,15 +53,19 @@ class Callback:
     """A callback of the system.
 
     Attributes:
-        number: its identity in the recording; `subscription` and `executor` likewise.
+        number: its identity in the recording; `subscription` and `executor` likewise. What comes to
+            a service or a client comes to a subscription of a negative number.
         group: callbacks of a group exclude each other; None: it runs beside all others.
-        rank: its place in the order in which its executor looks.
+        rank: its place in the order in which its executor looks: of the kind that comes first, of
+            what the recording alone tells, and of its kind among that.
         period: of its timer; None: it has none. `origin`: when it is due first.
         until: when it is due for the last time.
         is_retimed: it is due at other times than it was.
         factor: how many times as long as recorded it takes.
         instances: what it did, by the message that led to it, or by how often its timer was due
             before. Of other callbacks, when they are to run.
+        symbol: name of its function; None: not known.
+        awaited: share of its time for which its thread is free.
     """
 
     number: int
@@ -75,11 +79,18 @@ class Callback:
     period: int | None = None
     origin: int = 0
     until: int = 0
-    rank: int = 0
+    rank: tuple[int, float, int] = (0, 0, 0)
     is_retimed: bool = False
     factor: float = 1.0
     instances: dict[int, Instance] = field(default_factory=dict)
+    symbol: str | None = None
+    awaited: float = 0.0
     _known: list[tuple[int, int]] = field(default_factory=list)
+
+    @property
+    def topic(self) -> str:
+        """The topic of its subscription; '': it has none."""
+        return self.label[len("Subscription(") : -1] if self.kind == "subscription" else ""
 
     def like(self, at: int, fires: bool | None, outputs: frozenset[int]) -> Instance | None:
         """The run whose message was published nearest to a time.
@@ -115,6 +126,7 @@ class Executor:
         start: when it begins to look for work.
         falling: from when a thread looks in vain until it waits.
         waking: from when something comes until a wait ends.
+        polling: how long a wait lasts if there is something already.
         load: share of the time of its threads that callbacks need.
     """
 
@@ -125,6 +137,7 @@ class Executor:
     start: int
     falling: int
     waking: int
+    polling: int
     load: float = 0.0
 
 
@@ -149,7 +162,7 @@ class System:
             a subscription.
         paths: by the chain that ends a path, the path that it looks like.
         names: of paths.
-        executors_of: the executors that a path passes.
+        passed: the callbacks that a path passes.
         recorded: by path, how long its flows took.
         end: of the recording.
     """
@@ -161,6 +174,12 @@ class System:
     steps: Mapping[tuple[int | None, int, int], int]
     paths: Mapping[int, int]
     names: Mapping[int, str]
-    executors_of: Mapping[int, frozenset[int]]
+    passed: Mapping[int, frozenset[int]]
     recorded: Mapping[int, list[int]]
     end: int
+
+    def executors_of(self, path: int) -> frozenset[int]:
+        """The executors that a path passes."""
+        return frozenset(
+            self.callbacks[key].executor for key in self.passed[path] if key in self.callbacks
+        )

@@ -11,7 +11,8 @@ import pytest
 import msgflow
 from msgflow.errors import UsageError
 from msgflow.ingest import ingest
-from msgflow.replay.predict import Change, Prediction, Spread, is_near, predict
+from msgflow.replay.change import Change
+from msgflow.replay.predict import Gain, Prediction, Predictor, Spread, gain_of, is_near, predict
 from msgflow.run.slice import Slice
 from msgflow_sim import (
     Executor,
@@ -154,3 +155,80 @@ def test_what_does_not_exist_cannot_be_changed(tmp_path):
         with pytest.raises(UsageError) as raised:
             _asked(_system("jazzy"), tmp_path, [change])
         assert said is None or said in str(raised.value.hint)
+
+
+def _predicted(folder: Path, *changes: Change, rounds: int = 8) -> list[Prediction]:
+    with msgflow.open_db(folder / "run.duckdb") as opened:
+        run = Slice().one_run(opened.connection, "a replay")
+        return Predictor(opened.connection, run).predict(changes, rounds)
+
+
+def test_a_gain_is_the_mean_of_drawn_runs(tmp_path):
+    _asked(_system("jazzy"), tmp_path)
+    change = Change("executor", "/slow", 1)
+    drawn, again, single = (
+        _of(_predicted(tmp_path, change, rounds=rounds), "/answer → /sink") for rounds in (8, 8, 0)
+    )
+    assert drawn == again
+    assert drawn.p95 is not None
+    assert single.p95 is not None
+    assert 0 < drawn.p95.low < drawn.p95.size < drawn.p95.high
+    assert drawn.p95.size == pytest.approx(single.p95.size, rel=0.5)
+    assert single.replayed is not None
+    (predicted,) = single.predicted
+    size = single.replayed.p95 - predicted.p95
+    assert single.p95 == Gain(size, size, size)
+
+
+def test_what_a_change_cannot_reach_gains_nothing(tmp_path):
+    _asked(_system("jazzy"), tmp_path)
+    for each in _predicted(tmp_path, Change("duration", "/sink", 0.5)):
+        assert each.is_reached == each.path.endswith("/sink")
+        assert each.p95 is not None
+        if each.is_reached:
+            # The time that a thread needs to go on is not known better.
+            assert each.p95.high - each.p95.low >= 20_000
+        else:
+            assert each.median == each.p95 == Gain(0, 0, 0)
+
+
+def test_a_change_that_leaves_an_executor_no_time_has_no_size(tmp_path):
+    _asked(_system("jazzy"), tmp_path)
+    (path,) = (
+        each
+        for each in _predicted(tmp_path, Change("duration", "/slow", 2.4))
+        if each.path.endswith("/slow")
+    )
+    assert "with the change an executor is busy" in (path.doubt or "")
+    assert path.median is None
+
+
+def test_of_a_long_run_the_middle_is_replayed(tmp_path):
+    every = _of(_asked(_system("jazzy"), tmp_path), "/slow")
+    with msgflow.open_db(tmp_path / "run.duckdb") as opened:
+        run = Slice().one_run(opened.connection, "a replay")
+        predictor = Predictor(opened.connection, run, longest_ns=1_000_000_000)
+        some = _of(predictor.predict(), "/slow")
+    assert predictor.window is not None
+    assert predictor.window[1] - predictor.window[0] == pytest.approx(1_000_000_000, abs=2)
+    assert every.recorded is not None
+    assert some.recorded is not None
+    assert some.recorded.flows == pytest.approx(every.recorded.flows / 3, abs=3)
+    assert some.doubt is None
+
+
+def test_a_path_has_a_size_where_drawn_runs_are_like_the_recording(tmp_path, monkeypatch):
+    _asked(_system("jazzy"), tmp_path)
+    monkeypatch.setattr("msgflow.replay.predict.is_near", lambda *_: False)
+    change = Change("executor", "/slow", 1)
+    by_rounds = {
+        rounds: _of(_predicted(tmp_path, change, rounds=rounds), "/answer → /sink")
+        for rounds in (0, 8)
+    }
+    assert by_rounds[8].doubt is None
+    assert "differs" in (by_rounds[0].doubt or "")
+
+
+def test_one_drawn_run_alone_does_not_move_a_size():
+    assert gain_of([100, 200, 300, 90_000]).size == 250
+    assert gain_of([100]) == Gain(100, 100, 100)

@@ -10,12 +10,14 @@
 WITH ran AS (
     SELECT
         callback_id,
-        mode(executor_id) AS executor_id
+        mode(executor_id) AS executor_id,
+        coalesce(bool_or(publication_id < 0), false) AS is_called
     FROM replay_instance
     GROUP BY callback_id
 )
 SELECT
-    c.callback_id, r.executor_id, c.kind, l.node, l.label, c.subscription_id,
+    c.callback_id, r.executor_id, c.kind, l.node, l.label, c.symbol,
+    CASE WHEN r.is_called THEN -c.callback_id ELSE c.subscription_id END AS subscription_id,
     coalesce(s.queue_depth, 0) AS queue_depth,
     s.topic_name, t.period_ns, t.created_ns,
     p.python_version IS NOT NULL AS is_python,

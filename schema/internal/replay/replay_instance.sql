@@ -2,7 +2,8 @@
 -- description: What executors ran, with the moment at which the thread looked for it (looked_ns),
 --     begin and end of the wait that found it ready (wait_ns, round_ns: what is ready is decided
 --     then), the end of the wait before that one (before_ns), when the thread looked for more
---     (next_ns), and the message that it was called with. Executors without events of their own
+--     (next_ns), and the message that it was called with (a
+--     request or response has a negative number). Executors without events of their own
 --     have only that.
 -- grain: one row per callback instance that ended and is not nested in another
 WITH state AS (
@@ -35,11 +36,14 @@ message AS (
 instance AS (
     SELECT
         i.callback_instance_id, i.callback_id, x.executor_id, i.thread_id, i.start_ns, i.end_ns,
-        m.publication_id
+        coalesce(
+            m.publication_id, -2 * i.request_id, -2 * i.response_id - 1
+        ) AS publication_id
     FROM main.callback_instance AS i
     JOIN main.executor_thread AS x ON i.thread_id = x.thread_id
     LEFT JOIN message AS m ON i.take_id = m.take_id
     WHERE i.run_id = $run_id AND i.depth = 1 AND i.end_ns IS NOT NULL
+        AND i.start_ns BETWEEN $begin_ns AND $until_ns
 )
 SELECT
     i.callback_instance_id, i.callback_id, i.executor_id, i.thread_id, i.start_ns, i.end_ns,
