@@ -215,6 +215,21 @@ def test_a_long_recording_is_sampled(rules: duckdb.DuckDBPyConnection) -> None:
     assert count.fetchall() == [(48 * 134,)]
 
 
+def test_a_message_counts_once_however_many_publish_on_its_topic(
+    rules: duckdb.DuckDBPyConnection,
+) -> None:
+    """Each of 400 is looked for among the publications of five, and 48 vote together."""
+    record(rules)
+    rules.execute(
+        "INSERT INTO published SELECT p.* REPLACE (r.n AS publisher_id) "
+        "FROM published AS p, range(2, 6) AS r(n)"
+    )
+    count = rules.sql(
+        "SELECT count(DISTINCT source_timestamp_ns) FROM derive.stamp_pair(1) GROUP BY stretch"
+    )
+    assert sorted(count.fetchall()) == [(400 % 48,)] + [(48,)] * (400 // 48)
+
+
 @pytest.mark.parametrize(
     ("least", "greatest", "expected"), [(0, 6_000, 3_000), (0, 8_000, 4_000), (0, 20_000, 16_000)]
 )

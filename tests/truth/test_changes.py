@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 from support.ingested import ingest_one
+from support.robots import alone, robot
 
 import msgflow
 from msgflow.errors import UsageError
 from msgflow_sim import (
     Host,
     Node,
-    Process,
     Publisher,
     Recording,
     Scenario,
@@ -74,23 +74,13 @@ def system(*, changes: bool) -> Scenario:
                 ),
             ),
         )
+        killed = {"stop_ns": at(KILLED), "is_killed": True} if name == "killed" and changes else {}
         pid = 1000 + 100 * number
-        processes += [
-            Process(f"{name}_sensor", "robot", pid, (sensor,)),
-            Process(
-                name,
-                "robot",
-                pid + 50,
-                (reader,),
-                stop_ns=at(KILLED) if name == "killed" and changes else None,
-                is_killed=name == "killed" and changes,
-            ),
-        ]
-    return Scenario(
+        processes += [alone(sensor, pid), alone(reader, pid + 50, **killed)]
+    return robot(
+        *processes,
         name="changes",
-        description="Sensors with readers.",
         hosts=(Host("robot", cpu_count=16),),
-        processes=tuple(processes),
         duration_ns=SECONDS * SECOND,
         layout="kilted",
         overwrites=True,
@@ -215,8 +205,8 @@ def test_a_moment_has_what_changed_ran_and_was_slow(recorded: Path) -> None:
     with msgflow.open_db(recorded) as opened:
         moment = opened.why(at=f"{SLOWER + 0.3}s")
         calm = opened.why(at="4s")
-    assert moment.headline.startswith("/slower: duration of Subscription(/slower): 5.4")
-    assert f"since {SLOWER:.1f}" in moment.headline
+    said = f"since {SLOWER:.1f} s: duration of Subscription(/slower) of /slower: 5.4"
+    assert moment.headline.startswith(said)
     (duration, *_) = moment.sections["changes"].table.to_pylist()
     assert (duration["what"], duration["node"]) == ("duration", "/slower")
     ran = {row["node"]: row for row in moment.sections["callbacks"].table.to_pylist()}

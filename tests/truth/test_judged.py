@@ -8,11 +8,16 @@ from truth import Judged
 
 
 def _judged(
-    system: str, wrong: int, loss_affected: int, found: int = 1_000, **others: int
+    system: str,
+    wrong: int,
+    loss_affected: int,
+    found: int = 1_000,
+    kind: str = "transport",
+    **others: float,
 ) -> Judged:
     values = {"misguessed": 0, "repeated": 0, "missing": 0, "doubted": 0, "recall": 1.0, **others}
     score = Score(
-        "transport",
+        kind,
         found,
         found,
         found,
@@ -54,3 +59,12 @@ def test_other_faults_of_rivals_are_not_excused(fault):
 )
 def test_a_known_system_may_lack_links(system, recall, is_good):
     assert _judged(system, 0, 0, recall=recall).is_good is is_good
+
+
+@pytest.mark.parametrize(
+    ("kind", "missing", "is_good"),
+    [("approximate_sync", 6, True), ("approximate_sync", 7, False), ("transport", 6, False)],
+)
+def test_of_several_sets_a_marked_link_may_name_another(kind, missing, is_good):
+    judged = _judged("approximate_sync", 0, 0, kind=kind, missing=missing, misguessed=6, recall=0.9)
+    assert judged.is_good is is_good

@@ -11,18 +11,16 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 from support.ingested import ingest_one
+from support.robots import alone, robot
 
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow_sim import (
     Executor,
     Group,
-    Host,
     Node,
-    Process,
     Publisher,
     Recording,
-    Scenario,
     Subscription,
     Timer,
     Work,
@@ -58,22 +56,11 @@ _SHARED = Node(
     ),
     timers=(Timer(15 * MILLISECOND, group="any_time"),),
 )
-OVERLOADED = Scenario(
-    "overloaded",
-    "Timers beside callbacks that leave them little time.",
-    (Host("alpha"),),
-    (
-        Process("source", "alpha", 1101, (_SOURCE,)),
-        Process("busy", "alpha", 1201, (_BUSY,), start_ns=3 * MILLISECOND),
-        Process(
-            "shared",
-            "alpha",
-            1301,
-            (_SHARED,),
-            start_ns=5 * MILLISECOND,
-            executors=(Executor("multi_threaded", 2),),
-        ),
-    ),
+OVERLOADED = robot(
+    _SOURCE,
+    _BUSY,
+    alone(_SHARED, 2001, executors=(Executor("multi_threaded", 2),)),
+    name="overloaded",
     duration_ns=10 * SECOND,
 )
 

@@ -34,13 +34,15 @@ region AS MATERIALIZED (
     JOIN stretch AS s ON r.clock_id = s.clock_id AND r.stretch = s.stretch
     WHERE r.most_count >= derive.clock_limit().quorum
 ),
--- Two stretches in which publications were lost agree with some difference by chance.
+-- Two stretches in which publications were lost agree with some difference by chance. So they do at
+-- the begin and the end, where most messages are of other publishers.
 followed AS (
     SELECT
         *,
-        count(*) OVER in_segment >= derive.clock_limit().sharp_stretches
-        OR min(stretch) OVER in_segment = min(stretch) OVER on_clock
-        OR max(stretch) OVER in_segment = max(stretch) OVER on_clock AS is_lasting,
+        segment = 0
+        OR count(*) OVER in_segment >= derive.clock_limit().sharp_stretches AS is_lasting,
+        min(stretch) OVER in_segment = min(stretch) OVER on_clock
+        OR max(stretch) OVER in_segment = max(stretch) OVER on_clock AS is_at_edge,
         segment = 0 OR avg(is_alone::INTEGER) OVER in_segment >= 0.5 AS is_alone_mostly
     FROM derive.followed_difference('region')
     WINDOW
@@ -59,10 +61,15 @@ course AS MATERIALIZED (
         AND f.stretch = r.stretch
         AND f.difference_ns = r.difference_ns
         AND r.is_rival
-    WHERE f.is_lasting
+    WHERE f.is_lasting OR (f.is_at_edge AND share >= derive.clock_limit().explained_share)
 ),
--- What is not told has no vote.
-known AS MATERIALIZED (FROM course WHERE is_told),
+-- What is not told has no vote, nor has what is beside it: the clock may have been set there.
+known AS MATERIALIZED (
+    FROM course
+    QUALIFY bool_and(is_told) OVER (
+        PARTITION BY clock_id ORDER BY stretch ROWS BETWEEN 1 PRECEDING AND 1 FOLLOWING
+    )
+),
 judged AS (
     SELECT
         c.*, l.agrees,
@@ -111,8 +118,7 @@ told AS (
         coalesce(l.slack_ns, o.slack_ns) AS slack_ns,
         coalesce(
             l.agrees,
-            NOT c.is_told
-            AND c.stretch < o.last_stretch
+            c.stretch < o.last_stretch
             AND o.difference_ns + ((c.at_ns - o.middle_ns) * o.drift_ppb / 1e9)::BIGINT
                 BETWEEN c.least_ns AND c.greatest_ns,
             false
@@ -131,12 +137,12 @@ certain AS (
         *,
         lag(stretch) OVER on_clock IS NULL AS is_first,
         lead(stretch) OVER on_clock IS NULL AS is_last,
-        agrees
-        AND coalesce(lag(agrees) OVER on_clock AND lag(segment) OVER on_clock = segment, true)
-        AND coalesce(lead(agrees) OVER on_clock AND lead(segment) OVER on_clock = segment, true)
+        bool_and(agrees) OVER beside AND min(segment) OVER beside = max(segment) OVER beside
             AS is_certain
     FROM told
-    WINDOW on_clock AS (PARTITION BY clock_id ORDER BY stretch)
+    WINDOW
+        on_clock AS (PARTITION BY clock_id ORDER BY stretch),
+        beside AS (on_clock ROWS BETWEEN 1 PRECEDING AND 1 FOLLOWING)
 ),
 run AS (
     SELECT

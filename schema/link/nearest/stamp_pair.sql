@@ -42,11 +42,8 @@ apart AS (
 heard AS (
     SELECT
         t.clock_id, t.publisher_id, t.source_timestamp_ns, t.only_subscription_id,
-        min(CASE WHEN t.taken_clock_id = t.clock_id THEN t.taken_ns END) AS taken_ns,
-        coalesce(
-            min(CASE WHEN t.taken_clock_id = t.clock_id THEN t.taken_ns END),
-            min(t.taken_ns - a.apart_ns)
-        ) AS received_ns
+        min(CASE WHEN t.taken_clock_id = t.clock_id THEN t.taken_ns END) AS taken_here_ns,
+        coalesce(taken_here_ns, min(t.taken_ns - a.apart_ns)) AS received_ns
     FROM taken AS t
     JOIN apart AS a ON t.clock_id = a.clock_id AND t.taken_clock_id = a.taken_clock_id
     GROUP BY
@@ -55,12 +52,19 @@ heard AS (
 ),
 message AS (
     SELECT
-        clock_id, publisher_id, source_timestamp_ns, taken_ns, received_ns,
+        clock_id, publisher_id, source_timestamp_ns, taken_here_ns, received_ns,
         lag(source_timestamp_ns) OVER (
             PARTITION BY publisher_id, only_subscription_id ORDER BY source_timestamp_ns
         ) AS earlier_timestamp_ns,
-        count(*) OVER (PARTITION BY clock_id) AS message_count
+        dense_rank() OVER (PARTITION BY clock_id ORDER BY source_timestamp_ns) AS number
     FROM heard
+),
+counted AS (
+    SELECT
+        *,
+        max(number) OVER (PARTITION BY clock_id) AS message_count,
+        count(*) OVER (PARTITION BY clock_id) AS heard_count
+    FROM message
 ),
 numbered AS (
     SELECT
@@ -72,21 +76,13 @@ numbered AS (
             ),
             derive.clock_limit().stretch_messages
         ) AS stretch_size,
-        (row_number() OVER (PARTITION BY clock_id ORDER BY source_timestamp_ns, publisher_id) - 1)
-        // stretch_size AS stretch
-    FROM message
-),
-sampled AS (
-    SELECT
-        clock_id, publisher_id, source_timestamp_ns, taken_ns, received_ns, earlier_timestamp_ns,
-        stretch
-    FROM numbered
-    WHERE stretch % (1 + message_count // (stretch_size * derive.clock_limit().most_stretches)) = 0
+        (number - 1) // stretch_size AS stretch
+    FROM counted
 ),
 -- A clock that was set is far from that of the trace: a take tells about when.
 placed AS (
     SELECT
-        s.clock_id, s.publisher_id, s.stretch, s.source_timestamp_ns, s.taken_ns,
+        s.clock_id, s.publisher_id, s.stretch, s.source_timestamp_ns, s.taken_here_ns,
         s.earlier_timestamp_ns,
         unnest(range(
             p.position - derive.clock_limit().reach, p.position + derive.clock_limit().reach + 1
@@ -95,14 +91,16 @@ placed AS (
         SELECT
             *,
             unnest([source_timestamp_ns, received_ns]) AS near_ns
-        FROM sampled
+        FROM numbered
+        WHERE stretch % (1 + heard_count // (stretch_size * derive.clock_limit().most_stretches))
+            = 0
     ) AS s
     ASOF JOIN published AS p ON s.publisher_id = p.publisher_id AND s.near_ns >= p.written_ns
 ),
 paired AS (
     SELECT DISTINCT
         m.clock_id, m.stretch, m.source_timestamp_ns, p.publisher_id, p.written_ns,
-        m.taken_ns IS NOT NULL AS is_taken_here,
+        m.taken_here_ns IS NOT NULL AS is_taken_here,
         m.source_timestamp_ns - p.written_ns AS greatest_ns,
         m.source_timestamp_ns - p.closes_ns AS least_ns,
         m.source_timestamp_ns - p.next_written_ns AS later_ns,
@@ -111,7 +109,7 @@ paired AS (
     JOIN published AS p
         ON m.publisher_id = p.publisher_id
         AND m.position = p.position
-        AND p.written_ns <= coalesce(m.taken_ns, p.written_ns)
+        AND p.written_ns <= coalesce(m.taken_here_ns, p.written_ns)
 )
 SELECT
     clock_id, stretch, source_timestamp_ns, is_taken_here,

@@ -51,35 +51,60 @@ beginning AS (
         ON l.clock_id = p.clock_id AND l.topic_name = p.topic_name AND l.created_ns > p.at_ns
     WHERE l.entry_id <= p.entry_id
 ),
+sent AS (
+    SELECT
+        p.entry_id, p.publication_id, p.publisher_id, p.at_ns, p.topic_name, p.clock_id,
+        coalesce(b.at_ns, 0) AS begun_ns
+    FROM published AS p
+    ASOF LEFT JOIN beginning AS b
+        ON p.clock_id = b.clock_id AND p.topic_name = b.topic_name AND p.at_ns >= b.at_ns
+),
+taken AS (
+    SELECT
+        t.entry_id, t.take_id, t.subscription_id, t.at_ns, t.topic_name, t.clock_id,
+        coalesce(b.at_ns, 0) AS begun_ns
+    FROM received AS t
+    ASOF LEFT JOIN beginning AS b
+        ON t.clock_id = b.clock_id AND t.topic_name = b.topic_name AND t.at_ns >= b.at_ns
+),
+moment AS (
+    SELECT
+        clock_id, topic_name, entry_id, begun_ns, at_ns,
+        min(publication_id) AS publication_id,
+        arg_min(publisher_id, publication_id) AS publisher_id,
+        sum(count(*)) OVER (PARTITION BY clock_id, topic_name, entry_id, begun_ns) AS number
+    FROM sent
+    GROUP BY clock_id, topic_name, entry_id, begun_ns, at_ns
+),
+-- The nearest before and the nearest after: a damaged trace may have one number for all.
 candidate AS (
-    SELECT t.take_id, t.subscription_id, t.at_ns, p.publication_id, p.publisher_id, p.sent_ns
-    FROM (
-        SELECT
-            t.*,
-            b.at_ns AS begun_ns
-        FROM received AS t
-        ASOF LEFT JOIN beginning AS b
-            ON t.clock_id = b.clock_id AND t.topic_name = b.topic_name AND t.at_ns >= b.at_ns
-    ) AS t
-    JOIN (
-        SELECT
-            p.*,
-            p.at_ns AS sent_ns,
-            b.at_ns AS begun_ns
-        FROM published AS p
-        ASOF LEFT JOIN beginning AS b
-            ON p.clock_id = b.clock_id AND p.topic_name = b.topic_name AND p.at_ns >= b.at_ns
-    ) AS p
+    SELECT
+        t.take_id, t.subscription_id, p.publication_id, p.publisher_id, p.number,
+        t.at_ns - p.at_ns AS distance_ns
+    FROM taken AS t
+    ASOF JOIN moment AS p
         ON t.clock_id = p.clock_id
         AND t.topic_name = p.topic_name
         AND t.entry_id = p.entry_id
-        AND t.begun_ns IS NOT DISTINCT FROM p.begun_ns
+        AND t.begun_ns = p.begun_ns
+        AND t.at_ns >= p.at_ns
+    UNION ALL
+    SELECT
+        t.take_id, t.subscription_id, p.publication_id, p.publisher_id, p.number,
+        p.at_ns - t.at_ns
+    FROM taken AS t
+    ASOF JOIN moment AS p
+        ON t.clock_id = p.clock_id
+        AND t.topic_name = p.topic_name
+        AND t.entry_id = p.entry_id
+        AND t.begun_ns = p.begun_ns
+        AND t.at_ns < p.at_ns
 )
 SELECT
     only_run::BIGINT AS run_id,
     publication_id, take_id, publisher_id, subscription_id,
     'agnocast' AS method,
-    count(*) OVER (PARTITION BY take_id) AS candidate_count,
+    number::BIGINT AS candidate_count,
     false AS is_loss_affected
 FROM candidate
-QUALIFY row_number() OVER (PARTITION BY take_id ORDER BY abs(at_ns - sent_ns), publication_id) = 1
+QUALIFY row_number() OVER (PARTITION BY take_id ORDER BY distance_ns, publication_id) = 1

@@ -5,7 +5,8 @@
 --     topics. If several publications have the same topic and stamp, the k-th belongs to the k-th
 --     such take of a subscription, so that none is received twice. If there are more such takes
 --     than publications, some publications were lost, and each take may be of one of those. Equal
---     values need no clocks: a take may seem to come before its publication.
+--     values need no clocks: a take may seem to come before its publication. A stamp that more than
+--     64 publications have is that of no message: a damaged trace has it.
 -- grain: one row per take whose publication is known by its stamp
 -- param: has_unnamed BOOLEAN = true  Some topic is not known; false: none is looked for
 CREATE OR REPLACE MACRO derive.link_transport_exact(only_run, has_unnamed := true) AS TABLE
@@ -16,6 +17,15 @@ WITH unnamed AS (
     FROM derive.topic_group(only_run)
     WHERE has_unnamed AND topic_name IS NULL
 ),
+repeated_publication AS (
+    SELECT
+        source_timestamp_ns,
+        count(*) AS number
+    FROM store.publication
+    WHERE run_id = only_run AND source_timestamp_ns <> 0
+    GROUP BY source_timestamp_ns
+    HAVING count(*) > 1
+),
 published AS (
     SELECT
         b.publication_id, b.publisher_id, b.source_timestamp_ns, b.start_event_id,
@@ -25,6 +35,8 @@ published AS (
     FROM store.publication AS b
     LEFT JOIN store.publisher AS p ON b.publisher_id = p.publisher_id
     LEFT JOIN unnamed AS g ON b.publisher_id = g.id AND g.kind = 'publisher'
+    ANTI JOIN (FROM repeated_publication WHERE number > 64) AS q
+        ON b.source_timestamp_ns = q.source_timestamp_ns
     WHERE b.run_id = only_run AND b.source_timestamp_ns <> 0
 ),
 received AS (
@@ -37,13 +49,6 @@ received AS (
     LEFT JOIN store.subscription AS s ON t.subscription_id = s.subscription_id
     LEFT JOIN unnamed AS g ON t.subscription_id = g.id AND g.kind = 'subscription'
     WHERE t.run_id = only_run AND t.source_timestamp_ns <> 0
-),
-repeated_publication AS (
-    SELECT source_timestamp_ns
-    FROM store.publication
-    WHERE run_id = only_run AND source_timestamp_ns <> 0
-    GROUP BY source_timestamp_ns
-    HAVING count(*) > 1
 ),
 repeated_take AS (
     SELECT subscription_id, source_timestamp_ns
