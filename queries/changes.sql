@@ -21,6 +21,7 @@
 --     share, of 'queue' messages, of 'CPU use' CPUs
 -- column: after DOUBLE              Median after; of 'stop', 'begin' and 'gap' the longest silence
 -- column: change VARCHAR            Both, as people say it
+-- column: sentence VARCHAR          All of it, as people say it; moments since the begin of the run
 -- column: count BIGINT              Pauses, or messages and calls that are missing in the silence,
 --     or that a burst has more
 -- column: certainty DOUBLE [share]  Windows on their side of the middle between before and after;
@@ -28,14 +29,16 @@
 -- column: low DOUBLE                Trends: with 90 %, the slope is at least so much, per second
 -- column: high DOUBLE               Trends: and at most so much
 -- column: follows VARCHAR           The change that explains this one; empty: none does
+-- column: change_id BIGINT          Its number in the answer
+-- column: follows_id BIGINT         Number of the change that explains it
 -- column: meanwhile_node VARCHAR [node]  Node of the callback that ran for half of the time of the
 --     pauses, or more
 -- column: meanwhile_callback VARCHAR  What triggers it
 -- column: meanwhile_share DOUBLE [share]  For so much of their time
 -- column: since VARCHAR             What began or happened within the same second, and fits best
 -- column: others VARCHAR[]          What else did, the nearest in time first
--- brief: at_ns, kind, what, node, subject, change, since, follows, count,
---     meanwhile_callback, meanwhile_node, certainty, others, meanwhile_share
+-- brief: at_ns, sentence, kind, what, count, follows, certainty, others, meanwhile_callback, node,
+--     subject, change, since, meanwhile_node, meanwhile_share
 -- note: callbacks
 CREATE OR REPLACE TEMP TABLE series AS
 FROM main.series($runs);
@@ -57,51 +60,65 @@ FROM main.value_step('series_window');
 
 -- How many of the windows around the moment are on their side.
 CREATE OR REPLACE TEMP TABLE clear_step AS
-SELECT
-    c.*,
-    avg(
-        ((w.value > (c.before + c.after) / 2) = ((w.at_ns >= c.at_ns) = (c.after > c.before)))
-        ::INTEGER
-    ) AS certainty
-FROM main.value_step_exact('change_step', 'series_value', 'settled') AS c
-JOIN settled AS s ON c.run_id = s.run_id
-JOIN series_window AS w
-    ON c.what = w.what
-    AND c.series_id = w.series_id
-    AND abs(w.at_ns - c.at_ns) < (s.end_ns - s.start_ns) // 8
-GROUP BY ALL
-HAVING certainty > 0.85;
+FROM (
+    SELECT
+        c.*,
+        avg(
+            ((w.value > (c.before + c.after) / 2) = ((w.at_ns >= c.at_ns) = (c.after > c.before)))
+            ::INTEGER
+        ) AS certainty
+    FROM main.value_step_exact('change_step', 'series_value', 'settled') AS c
+    JOIN settled AS s ON c.run_id = s.run_id
+    JOIN series_window AS w
+        ON c.what = w.what
+        AND c.series_id = w.series_id
+        AND abs(w.at_ns - c.at_ns) < (s.end_ns - s.start_ns) // 8
+    GROUP BY ALL
+)
+WHERE certainty > 0.85;
 
 CREATE OR REPLACE TEMP TABLE change_found AS
 WITH trend AS (FROM main.value_trend('series_window'))
 SELECT
     run_id,
     'trend' AS kind,
-    what, series_id, at_ns, before, after,
-    NULL::BIGINT AS count,
-    certainty,
+    what, series_id, at_ns, before, after, certainty,
     slopes[1] * 1e9 AS low,
-    slopes[3] * 1e9 AS high,
-    NULL::BIGINT[][] AS times
+    slopes[3] * 1e9 AS high
 FROM trend
-UNION ALL
+UNION ALL BY NAME
 SELECT
-    s.run_id, 'step', s.what, s.series_id, s.at_ns, s.before, s.after, NULL, s.certainty, NULL,
-    NULL, NULL
-FROM clear_step AS s
-WHERE NOT EXISTS (FROM trend AS t WHERE t.what = s.what AND t.series_id = s.series_id)
-UNION ALL
-SELECT run_id, kind, what, series_id, at_ns, usual, longest_ns, count, NULL, NULL, NULL, times
-FROM main.value_pause($runs, 'series_value', 'settled')
-UNION ALL
+    run_id,
+    'step' AS kind,
+    what, series_id, at_ns, before, after, certainty
+FROM clear_step
+ANTI JOIN trend USING (what, series_id)
+UNION ALL BY NAME
 SELECT
-    run_id, 'burst', what, series_id, at_ns, usual, shortest_ns, count, NULL, NULL, NULL, NULL
+    run_id, kind, what, series_id, at_ns,
+    usual AS before,
+    longest_ns AS after,
+    count, times
+FROM main.value_pause('series_value', 'settled')
+UNION ALL BY NAME
+SELECT
+    run_id,
+    'burst' AS kind,
+    what, series_id, at_ns,
+    usual AS before,
+    shortest_ns AS after,
+    count
 FROM main.value_burst('series_value')
-UNION ALL
-SELECT run_id, 'step', 'loss', series_id, at_ns, before, after, NULL, NULL, NULL, NULL, NULL
+UNION ALL BY NAME
+SELECT
+    run_id,
+    'step' AS kind,
+    'loss' AS what,
+    series_id, at_ns, before, after
 FROM main.loss_step('series_value');
 
-CREATE OR REPLACE TEMP TABLE change_named AS
+-- What each series is of, which topics lead to it, and which are made of it.
+CREATE OR REPLACE TEMP TABLE series_named AS
 WITH node_topic AS (
     SELECT
         run_id, node,
@@ -111,32 +128,51 @@ WITH node_topic AS (
     GROUP BY run_id, node
 )
 SELECT
-    row_number() OVER (ORDER BY c.at_ns, c.what, c.series_id) AS change_id,
-    c.*,
-    s.node,
-    coalesce(s.subject, p.path) AS subject,
-    s.process_id, s.host_id, s.topic_name,
-    CASE WHEN c.what = 'latency' THEN string_split(p.path, ' → ') ELSE [s.node] END AS nodes,
+    unnest(
+        CASE s.owner
+            WHEN 'callback' THEN ['duration', 'CPU time', 'timer']
+            WHEN 'publisher' THEN ['topic']
+            WHEN 'subscription' THEN ['take', 'wait', 'queue', 'loss']
+            ELSE ['CPU use']
+        END
+    ) AS what,
+    s.series_id, s.node, s.subject, s.process_id, s.host_id, s.topic_name,
+    [s.node] AS nodes,
     CASE
-        WHEN c.what = 'latency' THEN p.topics
-        WHEN c.what = 'topic' THEN n.takes
+        WHEN s.owner = 'publisher' THEN n.takes
         WHEN s.topic_name IS NULL THEN []
         ELSE [s.topic_name]
     END AS takes,
-    CASE WHEN c.what IN ('duration', 'CPU time', 'timer', 'topic', 'take') THEN n.gives ELSE [] END
-    AS gives
+    n.gives
+FROM series AS s
+LEFT JOIN node_topic AS n ON s.run_id = n.run_id AND s.node = n.node
+WHERE s.object_id = s.series_id
+UNION ALL
+SELECT
+    'latency', path_id, NULL, path, NULL, NULL, NULL,
+    string_split(path, ' → '),
+    topics,
+    []
+FROM named_path;
+
+CREATE OR REPLACE TEMP TABLE change_named AS
+SELECT
+    row_number() OVER (ORDER BY c.at_ns, c.what, c.series_id) AS change_id,
+    c.*,
+    s.node, s.subject, s.process_id, s.host_id, s.topic_name, s.nodes, s.takes, s.gives,
+    CASE WHEN c.what = 'take' AND c.kind <> 'step' THEN 'taking ' ELSE '' END
+    || coalesce(s.subject, '?')
+    || coalesce(
+        CASE
+            WHEN c.what IN ('wait', 'queue', 'loss') THEN ' for '
+            WHEN c.what = 'take' THEN ' by '
+            ELSE ' of '
+        END
+        || s.node,
+        ''
+    ) AS whose
 FROM change_found AS c
-LEFT JOIN (FROM series WHERE object_id = series_id) AS s
-    ON c.what <> 'latency'
-    AND c.series_id = s.series_id
-    AND s.owner = CASE
-        WHEN c.what IN ('duration', 'CPU time', 'timer') THEN 'callback'
-        WHEN c.what = 'topic' THEN 'publisher'
-        WHEN c.what = 'CPU use' THEN 'program'
-        ELSE 'subscription'
-    END
-LEFT JOIN named_path AS p ON c.what = 'latency' AND c.series_id = p.path_id
-LEFT JOIN node_topic AS n ON s.run_id = n.run_id AND s.node = n.node;
+LEFT JOIN series_named AS s ON c.what = s.what AND c.series_id = s.series_id;
 
 CREATE OR REPLACE TEMP TABLE change_occasion AS
 SELECT
@@ -286,15 +322,50 @@ SELECT
         WHEN c.what = 'CPU use' THEN printf('%.2f → %.2f CPUs', c.before, c.after)
         ELSE main.duration_text(c.before::BIGINT) || ' → ' || main.duration_text(c.after::BIGINT)
     END AS change,
+    printf(
+        '%s %.1f s%s: ',
+        CASE
+            WHEN c.kind IN ('step', 'stop') THEN 'since'
+            WHEN c.kind = 'begin' THEN 'until'
+            WHEN c.kind = 'trend' THEN 'steadily from'
+            WHEN c.count = 1 THEN 'at'
+            ELSE 'from'
+        END,
+        (c.at_ns - r.start_ns) / 1e9,
+        coalesce(', when ' || b.since, '')
+    )
+        || CASE
+            WHEN c.kind IN ('stop', 'begin') THEN
+                printf('%s is silent, %d missing', c.whose, c.count)
+            WHEN c.kind = 'gap' THEN
+                printf(
+                    '%d pause%s of %s, %s', c.count, CASE WHEN c.count > 1 THEN 's' ELSE '' END,
+                    c.whose, change
+                )
+                || coalesce(printf(', while %s of %s runs', d.subject, d.node), '')
+            WHEN c.kind = 'burst' THEN printf('%d more of %s, %s', c.count, c.whose, change)
+            ELSE printf(
+                '%s of %s: %s',
+                CASE
+                    WHEN c.what IN ('timer', 'topic') THEN 'period'
+                    WHEN c.what = 'take' THEN 'time between takes'
+                    ELSE c.what
+                END,
+                c.whose, change
+            )
+        END AS sentence,
     c.count,
     c.certainty, c.low, c.high,
     x.what || ' ' || x.subject || coalesce(' of ' || x.node, '') AS follows,
+    c.change_id,
+    x.change_id AS follows_id,
     d.node AS meanwhile_node,
     d.subject AS meanwhile_callback,
     d.share AS meanwhile_share,
     b.since,
     list_filter(b.sentences, lambda each: each IS DISTINCT FROM b.since) AS others
 FROM change_named AS c
+JOIN main.run AS r ON c.run_id = r.run_id
 LEFT JOIN (FROM change_cause ANTI JOIN change_first USING (change_id)) AS f
     ON c.change_id = f.change_id
 LEFT JOIN change_named AS x ON f.cause_id = x.change_id

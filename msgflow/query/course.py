@@ -45,12 +45,16 @@ class Course:
 
 def read_course(connection: duckdb.DuckDBPyConnection, run: Run, times: Slice) -> Course:
     """Return what changed during a run."""
-    header = load_query("changes")
+    with Steps(connection) as steps:
+        changes = run_query(connection, load_query("changes"), {}, times, steps=steps)
+        return course_of(connection, run, changes)
+
+
+def course_of(connection: duckdb.DuckDBPyConnection, run: Run, changes: QueryResult) -> Course:
+    """Return changes with their values, and in words; the steps of the query are there yet."""
     start_ns, end_ns = run.start_ns or 0, run.end_ns or 0
     values = {"origin_ns": start_ns, "length_ns": max(end_ns - start_ns, 1)}
-    with Steps(connection) as steps:
-        changes = run_query(connection, header, {}, times, steps=steps)
-        lines = internal_sql().run(connection, "course_line", values).to_arrow_table()
+    lines = internal_sql().run(connection, "course_line", values).to_arrow_table()
     with registered(connection, change=changes.table, course_line=lines):
         sentences = internal_sql().run(connection, "course_sentence", values).to_arrow_table()
     return Course(changes, lines, sentences)

@@ -58,7 +58,7 @@ def explain_moment(
     window = times.window((run,))
     if not max(begin_ns, window.start_ns) <= at_ns <= min(run.end_ns or 0, window.end_ns):
         raise UsageError(f"the run has no such moment — {at}", "msgflow runs says how long it is")
-    values = {"runs": [run.run_id], "at_ns": at_ns, "run_start_ns": begin_ns}
+    values = {"runs": [run.run_id], "at_ns": at_ns}
     with Steps(connection) as steps:
         changes = run_query(
             connection, load_query("changes"), {"to": place}, times, steps=steps, runs=(run,)

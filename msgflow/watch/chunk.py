@@ -7,7 +7,7 @@ import re
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import NamedTuple
 
@@ -126,7 +126,7 @@ class ChunkFinder:
             else:
                 odd[number] = each
         if is_last:
-            now = datetime.now(UTC)
+            now = datetime.now(timezone.utc)
             for each in sorted(odd.values(), key=lambda each: each.begin):
                 if each.end <= now and self._may_follow(source, each):
                     yield from self._taken(source, each)

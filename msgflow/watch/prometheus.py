@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Iterator
+from itertools import groupby, islice
+from operator import itemgetter
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -13,6 +15,7 @@ from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query
 from msgflow.run.slice import Slice
 from msgflow.sql.statement import internal_sql, registered
+from msgflow.text.installation import install_command
 from msgflow.watch.window_report import discarded_events
 
 if TYPE_CHECKING:
@@ -26,7 +29,7 @@ BOUNDS_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 """Bounds of the buckets of latencies [s]."""
 
 MOST_LABELS = 1_000
-"""Paths, subscriptions that lost messages, and violated targets that metrics have at most."""
+"""Paths, subscriptions that lost messages, violated targets and counters of a kind, at most."""
 
 _SECOND_NS = 1_000_000_000
 # Where clocks are apart, latencies may be negative: a sum that falls would be no counter.
@@ -75,7 +78,7 @@ class Exporter:
             from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
         except ImportError:
             raise UsageError(
-                "prometheus-client is not installed", "pip install 'ros2-msgflow[prometheus]'"
+                "prometheus-client is not installed", install_command("prometheus-client")
             ) from None
         from msgflow.view.server import HOST, serve_text
 
@@ -114,7 +117,11 @@ class Exporter:
             for *labels, number in losses:
                 self._losses[tuple(labels)] = self._losses.pop(tuple(labels), 0) + number
             self._discarded += discarded
-            self._counters = counters[:MOST_LABELS]
+            self._counters = [
+                each
+                for _, alike in groupby(counters, key=itemgetter(0))
+                for each in islice(alike, MOST_LABELS)
+            ]
             self._forget()
 
     def _forget(self) -> None:

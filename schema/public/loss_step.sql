@@ -25,11 +25,11 @@ WITH RECURSIVE message AS MATERIALIZED (
 ten AS (
     SELECT
         series_id,
-        lead(lost) OVER in_time - lost AS lost,
-        lost - lag(lost) OVER in_time AS lost_before
+        lead(lost) OVER of_ten - lost AS lost,
+        lost - lag(lost) OVER of_ten AS lost_before
     FROM message
     WHERE number % 10 = 1
-    WINDOW in_time AS (PARTITION BY series_id ORDER BY number)
+    WINDOW of_ten AS (PARTITION BY series_id ORDER BY number)
 ),
 chance AS (
     SELECT
@@ -75,10 +75,10 @@ part (series_id, first, last) AS (
 change AS (
     SELECT
         m.run_id, m.series_id, m.at_ns,
-        m.lost - lag(m.lost) OVER in_time AS lost_before,
-        m.number - lag(m.number) OVER in_time AS messages_before,
-        lead(m.lost) OVER in_time - m.lost AS lost_after,
-        lead(m.number) OVER in_time - m.number AS messages_after
+        m.lost - lag(m.lost) OVER of_changes AS lost_before,
+        m.number - lag(m.number) OVER of_changes AS messages_before,
+        lead(m.lost) OVER of_changes - m.lost AS lost_after,
+        lead(m.number) OVER of_changes - m.number AS messages_after
     FROM message AS m
     JOIN (
         SELECT
@@ -91,7 +91,7 @@ change AS (
             last
         FROM part
     ) AS p ON m.series_id = p.series_id AND m.number = p.number
-    WINDOW in_time AS (PARTITION BY m.series_id ORDER BY m.number)
+    WINDOW of_changes AS (PARTITION BY m.series_id ORDER BY m.number)
 )
 SELECT
     c.run_id, c.series_id, c.at_ns,

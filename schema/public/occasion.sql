@@ -60,24 +60,35 @@ taken AS (
     JOIN main.other_thread AS o ON p.preemptor_other_thread_id = o.other_thread_id
     WHERE list_contains(runs, o.run_id) AND NOT coalesce(o.is_recorder, false)
 ),
-stamped AS (
+clock_step AS (
     SELECT
-        f.run_id, f.host_id,
+        b.run_id, p.host_id,
         min(b.start_ns) AS at_ns,
-        min(t.source_timestamp_ns - b.start_ns) AS ahead_ns
-    FROM (SELECT DISTINCT run_id, host_id FROM main.finding WHERE name = 'clock_jumps') AS f
-    JOIN main.process AS p ON f.host_id = p.host_id
+        min(t.source_timestamp_ns - b.start_ns)
+        - lag(min(t.source_timestamp_ns - b.start_ns))
+            OVER (PARTITION BY p.host_id ORDER BY min(b.start_ns))
+        AS step_ns
+    FROM main.process AS p
     JOIN main.publication AS b ON p.process_id = b.process_id
     JOIN main.link_transport AS l ON b.publication_id = l.publication_id
     JOIN main.take AS t ON l.take_id = t.take_id
-    WHERE list_contains(runs, f.run_id) AND t.source_timestamp_ns <> 0
-    GROUP BY f.run_id, f.host_id, b.start_ns // 100_000_000
+    WHERE list_contains(runs, b.run_id)
+        AND p.host_id IN (SELECT host_id FROM main.finding WHERE name = 'clock_jumps')
+        AND t.source_timestamp_ns <> 0
+    GROUP BY b.run_id, p.host_id, b.start_ns // 100_000_000
 ),
-clock_step AS (
+asked AS (
     SELECT
-        run_id, host_id, at_ns,
-        ahead_ns - lag(ahead_ns) OVER (PARTITION BY run_id, host_id ORDER BY at_ns) AS step_ns
-    FROM stamped
+        q.run_id,
+        coalesce(q.sent_ns, q.taken_ns) AS at_ns,
+        list_filter([m.full_name, n.full_name], lambda name: name IS NOT NULL) AS nodes,
+        string_split(coalesce(v.service_name, c.service_name), '/_action/') AS names
+    FROM main.request AS q
+    LEFT JOIN main.service AS v ON q.service_id = v.service_id
+    LEFT JOIN main.node AS n ON v.node_id = n.node_id
+    LEFT JOIN main.client AS c ON q.client_id = c.client_id
+    LEFT JOIN main.node AS m ON c.node_id = m.node_id
+    WHERE list_contains(runs, q.run_id) AND NOT coalesce(v.is_internal, c.is_internal, false)
 )
 SELECT
     run_id,
@@ -159,36 +170,17 @@ WHERE list_contains(runs, b.run_id) AND b.start_ns > n.created_ns + 1_000_000_00
     )
 UNION ALL
 SELECT
-    g.run_id, 'goal',
-    coalesce(g.sent_ns, g.taken_ns),
-    list_filter([m.full_name, n.full_name], lambda name: name IS NOT NULL),
+    run_id,
+    CASE WHEN len(names) > 1 THEN 'goal' ELSE 'request' END,
+    at_ns, nodes,
     [],
     NULL,
-    printf('a goal of %s was sent', g.action_name)
-FROM main.goal AS g
-LEFT JOIN main.service AS v ON g.action_server_id = v.service_id
-LEFT JOIN main.node AS n ON v.node_id = n.node_id
-LEFT JOIN main.client AS c ON g.action_client_id = c.client_id
-LEFT JOIN main.node AS m ON c.node_id = m.node_id
-WHERE list_contains(runs, g.run_id)
-UNION ALL
-SELECT
-    q.run_id, 'request',
-    coalesce(q.sent_ns, q.taken_ns),
-    list_filter([m.full_name, n.full_name], lambda name: name IS NOT NULL),
-    [],
-    NULL,
-    printf('%s was called', coalesce(v.service_name, c.service_name))
-FROM main.request AS q
-LEFT JOIN main.service AS v ON q.service_id = v.service_id
-LEFT JOIN main.node AS n ON v.node_id = n.node_id
-LEFT JOIN main.client AS c ON q.client_id = c.client_id
-LEFT JOIN main.node AS m ON c.node_id = m.node_id
-WHERE list_contains(runs, q.run_id)
-    AND NOT coalesce(v.is_internal, c.is_internal, false)
-    AND coalesce(v.service_name, c.service_name) NOT LIKE '%/_action/%'
+    CASE WHEN len(names) > 1 THEN printf('a goal of %s was sent', names[1])
+        ELSE names[1] || ' was called' END
+FROM asked
+WHERE coalesce(names[2], 'send_goal') = 'send_goal'
 -- A service that is called all the time is no occasion.
-QUALIFY count(*) OVER (PARTITION BY q.run_id, coalesce(v.service_name, c.service_name)) <= 5
+QUALIFY len(names) > 1 OR count(*) OVER (PARTITION BY run_id, names) <= 5
 UNION ALL
 SELECT
     run_id, 'program',

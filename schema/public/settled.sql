@@ -1,6 +1,7 @@
 -- description: Between which moments a run is looked at for changes. The nodes that begin with the
 --     first one, each within 3 s of the one before, take a second to settle. Where half of the
---     processes end within the last 5 s, the run ends when the first of these ends, within 2 s.
+--     processes end within 5 s of the last one, and that within 15 s of the end, the run ends when
+--     the first of these ends, within 2 s.
 -- grain: one row per run
 -- param: runs
 -- param: window_start_ns BIGINT  Not before this moment, epoch ns; NULL: any
@@ -32,25 +33,28 @@ begun AS (
 seen AS (
     SELECT
         run_id, last_seen_ns,
-        quantile_disc(last_seen_ns, 0.5) OVER (PARTITION BY run_id) AS half_ns
+        quantile_disc(last_seen_ns, 0.5) OVER of_run AS half_ns,
+        max(last_seen_ns) OVER of_run AS last_ns
     FROM main.process
     WHERE list_contains(runs, run_id)
         AND process_id IN (SELECT process_id FROM main.node WHERE list_contains(runs, run_id))
+    WINDOW of_run AS (PARTITION BY run_id)
 ),
 ended AS (
     SELECT
-        run_id, half_ns,
+        run_id, last_ns,
         min(last_seen_ns) AS end_ns
     FROM seen
-    WHERE last_seen_ns > half_ns - 2_000_000_000
-    GROUP BY run_id, half_ns
+    WHERE last_seen_ns > half_ns - 2_000_000_000 AND half_ns > last_ns - 5_000_000_000
+    GROUP BY run_id, last_ns
 )
 SELECT
     r.run_id,
     greatest(r.start_ns, window_start_ns, b.start_ns) AS start_ns,
     least(
         r.end_ns, window_end_ns,
-        CASE WHEN e.half_ns > r.end_ns - 5_000_000_000 THEN e.end_ns END
+        -- A launch may wait 10 s for one that does not end.
+        CASE WHEN e.last_ns > r.end_ns - 15_000_000_000 THEN e.end_ns END
     ) AS end_ns
 FROM main.run AS r
 LEFT JOIN begun AS b ON r.run_id = b.run_id

@@ -35,7 +35,7 @@ period AS MATERIALIZED (
         FROM main.publication
     ) AS t ON s.what = t.what AND s.object_id = t.object_id
 ),
-pause AS MATERIALIZED (FROM main.value_pause([only_run], 'period', 'settled'))
+pause AS MATERIALIZED (FROM main.value_pause('period', 'settled'))
 SELECT
     s.*,
     p.at_ns, p.count,

@@ -2,7 +2,7 @@
 --     for much longer than they usually do. Pauses in which a trace has a gap are left out, and so
 --     are those as long as chance makes them where single ones are left out now and then.
 -- grain: one row per series and kind
--- param: runs, series_values, settled
+-- param: series_values, settled
 -- column: run_id
 -- column: kind VARCHAR  'stop', 'begin' or 'gap'
 -- column: what VARCHAR  'timer', 'topic' or 'take'
@@ -12,7 +12,7 @@
 -- column: longest_ns BIGINT [ns]  Longest silence
 -- column: count BIGINT  Pauses; of 'stop' and 'begin' what is missing in the silence
 -- column: times BIGINT[][]  Begin and end of each, epoch ns
-CREATE OR REPLACE MACRO main.value_pause(runs, series_values, settled) AS TABLE
+CREATE OR REPLACE MACRO main.value_pause(series_values, settled) AS TABLE
 WITH usual AS (
     SELECT
         run_id, what, series_id,
@@ -37,9 +37,6 @@ omitted AS (
     WHERE v.value > 1.5 * u.median_ns AND v.value <= 2 * u.p95_ns
     GROUP BY u.what, u.series_id
 ),
-gap AS (
-    SELECT run_id, start_ns, end_ns FROM main.gap WHERE list_contains(runs, run_id)
-),
 pause AS (
     SELECT
         v.run_id, v.what, v.series_id, u.median_ns,
@@ -55,15 +52,13 @@ pause AS (
         -- So many in a row are left out by chance in less than one of a thousand runs.
         AND u.count * coalesce(o.share, 0) ** (v.value / u.median_ns - 1) < 0.001
     UNION ALL
-    SELECT u.run_id, u.what, u.series_id, u.median_ns, 'stop', u.last_ns, s.end_ns
+    SELECT u.run_id, u.what, u.series_id, u.median_ns, e.kind, e.from_ns, e.to_ns
     FROM usual AS u
     JOIN query_table(settled) AS s ON u.run_id = s.run_id
-    WHERE s.end_ns - u.last_ns > greatest(10 * u.p95_ns, 2 * u.longest_ns, 1_000_000_000)
-    UNION ALL
-    SELECT u.run_id, u.what, u.series_id, u.median_ns, 'begin', s.start_ns, u.first_ns
-    FROM usual AS u
-    JOIN query_table(settled) AS s ON u.run_id = s.run_id
-    WHERE u.first_ns - s.start_ns > greatest(10 * u.p95_ns, 2 * u.longest_ns, 1_000_000_000)
+    CROSS JOIN LATERAL (
+        VALUES ('stop', u.last_ns, s.end_ns), ('begin', s.start_ns, u.first_ns)
+    ) AS e (kind, from_ns, to_ns)
+    WHERE e.to_ns - e.from_ns > greatest(10 * u.p95_ns, 2 * u.longest_ns, 1_000_000_000)
 )
 SELECT
     p.run_id, p.kind, p.what, p.series_id,
@@ -75,7 +70,7 @@ SELECT
     list([p.from_ns, p.to_ns] ORDER BY p.from_ns) AS times
 FROM pause AS p
 WHERE NOT EXISTS (
-    FROM gap AS g
+    FROM main.gap AS g
     WHERE g.run_id = p.run_id
         AND g.start_ns < p.to_ns
         AND g.end_ns > p.from_ns

@@ -60,6 +60,13 @@ step AS (
             ORDER BY at_ns
             ROWS BETWEEN 1 FOLLOWING AND UNBOUNDED FOLLOWING
         )
+),
+best_step AS (
+    SELECT
+        what, series_id,
+        min(error) AS error
+    FROM step
+    GROUP BY what, series_id
 )
 SELECT
     l.run_id, l.what, l.series_id, l.at_ns,
@@ -69,11 +76,8 @@ SELECT
     l.slopes
 FROM line AS l
 JOIN coarse AS c ON l.what = c.what AND l.series_id = c.series_id
+JOIN best_step AS s ON l.what = s.what AND l.series_id = s.series_id
 WHERE abs(after - l.base) > main.least_change(l.what)
     AND greatest(l.base, after) > 1.3 * least(l.base, after)
 GROUP BY ALL
-HAVING sum((c.value - l.base - l.slopes[2] * (c.at_ns - l.at_ns)) ** 2) < (
-    SELECT min(s.error)
-    FROM step AS s
-    WHERE s.what = l.what AND s.series_id = l.series_id
-)
+HAVING sum((c.value - l.base - l.slopes[2] * (c.at_ns - l.at_ns)) ** 2) < any_value(s.error)

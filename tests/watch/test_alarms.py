@@ -8,7 +8,6 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable
-from contextlib import chdir
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -141,7 +140,8 @@ def test_a_target_that_falls_silent_is_said_once(tmp_path: Path) -> None:
     simulate("restarts", tmp_path / "trace", recording=Recording(rotations=rotations))
     (tmp_path / "targets.yaml").write_text("targets: [{topic: /result, rate: '> 1 Hz'}]")
     words = ("watch", "trace", "--once", "--window", "50ms", "--step", "50ms", "--json")
-    with chdir(tmp_path):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path)
         result = CliRunner().invoke(app, [*words, "--targets", "targets.yaml"])
     windows = [json.loads(line)["verdicts"] for line in result.stdout.splitlines()]
     counted = [set(verdicts) for verdicts in windows]

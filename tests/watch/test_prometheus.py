@@ -260,3 +260,17 @@ def unused_port() -> int:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         return int(taken.getsockname()[1])
+
+
+def test_counters_of_one_kind_leave_room_for_those_of_others(
+    real: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("msgflow.watch.prometheus.MOST_LABELS", 1)
+    exporter = Exporter()
+    with Database(real("real_rotate")) as whole:
+        ((start_ns, end_ns),) = whole.connection.execute(
+            "SELECT start_ns, end_ns FROM run"
+        ).fetchall()
+        exporter.count(whole.connection, Window(start_ns, end_ns))
+    found = {each.name: len(each.samples) for each in exporter.collect()}
+    assert found["msgflow_topic_rate_hertz"] == found["msgflow_queue_messages"] == 1

@@ -5,20 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from support.robots import alone, robot
 from typer.testing import CliRunner
 
 from msgflow.cli.app import app
-from msgflow_sim import (
-    Host,
-    Node,
-    Process,
-    Publisher,
-    Recording,
-    Scenario,
-    Subscription,
-    Timer,
-    simulate,
-)
+from msgflow_sim import Node, Publisher, Recording, Subscription, Timer, simulate
 
 MS = 1_000_000
 SECOND = 1_000_000_000
@@ -40,18 +31,8 @@ def test_a_timer_that_is_cancelled_is_told_once(tmp_path: Path) -> None:
         timers=(Timer(30 * MS, publishes=("/extra",)),),
     )
     sink = Node("sink", subscriptions=(Subscription("/cmd"), Subscription("/state")))
-    scenario = Scenario(
-        name="stopping",
-        description="A timer is cancelled.",
-        hosts=(Host("robot"),),
-        processes=(
-            Process("controller", "robot", 1001, (controller,)),
-            Process("ended", "robot", 1101, (ended,), stop_ns=4 * SECOND),
-            Process("sink", "robot", 1201, (sink,)),
-        ),
-        duration_ns=7 * SECOND,
-        layout="rolling",
-    )
+    parts = controller, alone(ended, 2001, stop_ns=4 * SECOND), sink
+    scenario = robot(*parts, duration_ns=7 * SECOND, layout="rolling")
     recording = Recording(rotations=tuple(SECOND * n for n in range(1, 7)))
     simulate(scenario, tmp_path / "trace", recording=recording)
     words = ["watch", str(tmp_path / "trace"), "--once", "--window", "4s", "--step", "1s"]

@@ -15,6 +15,7 @@ from unittest.mock import Mock
 
 import duckdb
 import pytest
+from support.robots import robot
 from support.same_windows import by_path, require_equal, require_same_as_whole
 from support.thorough import few, thorough
 
@@ -34,12 +35,9 @@ from msgflow.watch.learned_answers import LearnedAnswers
 from msgflow.watch.watcher import Watcher
 from msgflow.watch.window_report import WindowReport
 from msgflow_sim import (
-    Host,
     Node,
-    Process,
     Publisher,
     Recording,
-    Scenario,
     Subscription,
     Timer,
     Work,
@@ -405,20 +403,10 @@ def hang(tmp_path_factory: pytest.TempPathFactory) -> Path:
         timers=(Timer(1_300 * MS, work=Work(typical_ns=700 * MS)),),
     )
     sink = Node("sink", subscriptions=(Subscription("/objects"),))
-    robot = Scenario(
-        name="hang",
-        description="A detector that is busy with one callback for 700 ms.",
-        hosts=(Host("alpha"),),
-        processes=(
-            Process("camera", "alpha", 1101, (camera,)),
-            Process("detector", "alpha", 1201, (detector,), start_ns=3 * MS),
-            Process("sink", "alpha", 1301, (sink,), start_ns=7 * MS),
-        ),
-        duration_ns=2_600 * MS,
-    )
+    scenario = robot(camera, detector, sink, duration_ns=2_600 * MS)
     directory = tmp_path_factory.mktemp("hang") / "trace"
     rotations = tuple(200 * MS * number for number in range(1, 13))
-    simulate(robot, directory, recording=Recording(rotations=rotations))
+    simulate(scenario, directory, recording=Recording(rotations=rotations))
     return directory
 
 

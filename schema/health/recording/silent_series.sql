@@ -49,6 +49,22 @@ unexplained AS (
             ) BETWEEN t.at_ns - t.near_ns AND t.at_ns + t.near_ns,
             false
         )
+),
+beside AS (
+    SELECT
+        t.what, t.object_id,
+        array_to_string(
+            list(
+                o.sentence
+                ORDER BY
+                    list_contains(o.nodes, n.full_name) DESC, abs(o.at_ns - t.at_ns), o.sentence
+            )[:3],
+            '; '
+        ) AS sentences
+    FROM unexplained AS t
+    JOIN main.occasion([$run_id], 'known') AS o ON abs(o.at_ns - t.at_ns) < t.near_ns
+    LEFT JOIN main.node AS n ON t.node_id = n.node_id
+    GROUP BY t.what, t.object_id
 )
 SELECT
     t.run_id, t.what, t.node_id, t.topic_name, t.at_ns, t.count,
@@ -70,23 +86,11 @@ SELECT
             ''
         ),
         coalesce(
-            printf('within %s: ', main.duration_text(t.near_ns)) || (
-                SELECT
-                    array_to_string(
-                        list(
-                            o.sentence
-                            ORDER BY
-                                list_contains(o.nodes, n.full_name) DESC, abs(o.at_ns - t.at_ns),
-                                o.sentence
-                        )[:3],
-                        '; '
-                    )
-                FROM main.occasion([$run_id], 'known') AS o
-                WHERE abs(o.at_ns - t.at_ns) < t.near_ns
-            ),
+            printf('within %s: %s', main.duration_text(t.near_ns), b.sentences),
             'nothing else is seen to begin or end then'
         )
     ) AS sentence
 FROM unexplained AS t
 LEFT JOIN main.node AS n ON t.node_id = n.node_id
+LEFT JOIN beside AS b ON t.what = b.what AND t.object_id = b.object_id
 LEFT JOIN main.callback_label AS l ON t.what = 'timer' AND t.object_id = l.callback_id

@@ -16,7 +16,7 @@ WITH flow AS (
         p.path, o.root_ns, o.latency_ns,
         o.root_ns < $at_ns + 500_000_000 AND o.sink_ns > $at_ns - 500_000_000 AS is_near
     FROM path_outcome AS o
-    JOIN (SELECT DISTINCT path_id, path FROM named_path) AS p ON o.alike_id = p.path_id
+    JOIN named_path AS p ON o.alike_id = p.path_id
     WHERE o.is_first AND o.latency_ns > 0
 )
 SELECT
