@@ -26,12 +26,6 @@ WHERE database_name = current_database() AND schema_name IN ('store', 'main', 'd
     AND table_name <> 'alembic_version'
 UNION ALL
 SELECT
-    'trigger ' || schema_name || '.' || trigger_name,
-    coalesce(sql, '')
-FROM duckdb_triggers()
-WHERE database_name = current_database()
-UNION ALL
-SELECT
     'type ' || schema_name || '.' || type_name,
     ''
 FROM duckdb_types()

@@ -218,7 +218,6 @@
 --     'cut_by_recording' or 'unknown'
 -- column: subscription_count BIGINT  Subscriptions
 -- column: subscription_id BIGINT  Identity of the subscription
--- column: subscriptions BIGINT[]  Subscriptions in order
 -- column: symbol VARCHAR  Function registered for the callback
 -- column: take_count BIGINT  Messages handed over to a subscription
 -- column: take_id BIGINT  Take at the end of the path

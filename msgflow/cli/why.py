@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any
 
+from msgflow.backports import Unpack
 from msgflow.cli.culprits import culprit_lines
 from msgflow.cli.moment import moment_lines
 from msgflow.cli.operation import extends
 from msgflow.cli.output import command_text, print_note, print_runs, print_status
+from msgflow.cli.progress import replay_progress
+from msgflow.cli.remedy import remedy_lines
 from msgflow.cli.sections import SectionsFormat, chosen_format, print_sections, screen_sections
 from msgflow.cli.story import print_story
 from msgflow.database import Database
@@ -39,6 +42,7 @@ _SHOWN = {
 def command(
     database: Database,
     *,
+    fix: bool = False,
     goal: str | None = None,
     request: int | None = None,
     form: SectionsFormat | None = None,
@@ -54,12 +58,25 @@ def command(
     The last lines are the commands to ask next.
 
     Args:
+        fix: Try what may make data sooner, in replays of the run, in place of that.
         goal (ID): What became of a goal, in place of that: goal_id of the view goal, or its first
             digits.
         request (ID): Likewise of the call of a service: request_id of the view request.
         form (table|json|markdown): By default by the suffix of FILE, else table.
     """
     form = chosen_format(form, output)
+    if fix:
+        if "at" in asked or goal is not None or request is not None:
+            raise UsageError("what is tried is tried on all of a run", "leave out the rest")
+        with replay_progress() as progress:
+            remedies = database.remedies(**asked, progress=progress)
+        print_runs([remedies.run])
+        run: SliceWords = {"run": asked.get("run")}
+        lines = partial(remedy_lines, remedies, lambda words: _command(words, run, database.path))
+        print_sections(remedies.sections, form, output, None if wide else lines)
+        for note in remedies.notes:
+            print_note(note)
+        return
     if goal is None and request is None:
         found = database.why(**asked)
         # A pager may read the rest of it for long: others can write to the database meanwhile.
@@ -106,6 +123,9 @@ def _show(
         print_note(note)
     for step in found.steps:
         print_status(f"next: {_command(step, part, database)}")
+    if found.suggestion is not None:
+        fix = _command(("why", *((found.place,) if found.place else ()), "--fix"), part, database)
+        print_status(f"{found.suggestion} ({fix})")
 
 
 def _brief(
@@ -141,9 +161,9 @@ def _shown(found: Explanation) -> dict[str, QueryResult]:
 def _command(step: Sequence[str], part: SliceWords, database: Path) -> str:
     # Of a flow the identity tells the run; suggestions and findings are from all of a run.
     whole: SliceWords = {"run": part.get("run")}
-    taken = {"query": part, "suggest": whole, "check": whole}.get(step[0], {})
+    taken = {"query": part, "why": part, **dict.fromkeys(("suggest", "check", "predict"), whole)}
     words = ["msgflow", *step]
-    for name, value in taken.items():
+    for name, value in taken.get(step[0], {}).items():
         if value is not None:
             words += [f"--{name.replace('_', '-')}", str(value)]
     return command_text(words, database)

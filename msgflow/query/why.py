@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from msgflow.errors import NoFlowError
 from msgflow.files.resources import resource_directory
 from msgflow.query.catalogue import load_query
+from msgflow.query.course import Course, course_of
 from msgflow.query.differences import warm_up_seconds
 from msgflow.query.names import with_path_numbers
 from msgflow.query.runner import Steps, run_query
@@ -70,8 +71,11 @@ class Explanation:
             the sum of the others. Of 100 flows, 95 take no longer.
         waits: rows of `waits --by pair`: what kept the callbacks of the path waiting longest.
         losses: rows of `topics --measure delivery` on its topics with messages dropped or lost.
+        course: what changed during all that was asked for, also in a warm-up.
+        candidates: what may make data sooner, to be tried in a replay.
         steps: commands that show more of the path, as words behind `msgflow`.
         notes: a sentence each.
+        suggestion: what to try first; None: nothing that is known to gain much.
     """
 
     run: Run
@@ -84,8 +88,11 @@ class Explanation:
     slow_flow: QueryResult
     waits: QueryResult
     losses: QueryResult
+    course: Course
+    candidates: pa.Table
     steps: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...]
+    suggestion: str | None = None
 
     @property
     def sections(self) -> dict[str, QueryResult]:
@@ -115,7 +122,12 @@ class _Questions:
 
     def explanation(self, asked: Slice) -> Explanation:
         """Ask all that an explanation consists of."""
-        times, paths = self.paths(asked)
+        first = self.ask(_FIRST, asked, to=self.place)
+        if not _has_flows(first):
+            raise self.nothing(asked)
+        changes = self.ask("changes", asked, to=self.place)
+        course = course_of(self.connection, self.run, changes)
+        times, paths = self.paths(asked, first)
         values: dict[str, Any] = {
             "runs": [self.run.run_id],
             **times.window([self.run]).bindings,
@@ -126,20 +138,24 @@ class _Questions:
         self.keep(["ready_wait"], values)
         waits = self.ask("waits-pair", times)
         parts = self.ask("path-breakdown", times, to=self.place)
-        # What is lost while a system warms up is lost.
+        # What is lost while a system warms up is lost, but not by what runs later.
         losses = self.ask("topics-delivery", asked)
-        changes = self.ask("changes", times, to=self.place)
+        later = losses if times == asked else self.ask("topics-delivery", times)
         tables = {
             "path_row": paths.table,
             "breakdown": parts.table,
-            "delivery": losses.table,
+            "delivery": later.table,
+            "whole_delivery": losses.table,
             "change": changes.table,
         }
         with registered(self.connection, **tables):
             for kind in culprit_sql().names():
                 self.keep(culprit_sql().header(kind).reads, values)
             self.steps.unite("culprit", culprit_sql(), values)
-            verdict = internal_sql().run(self.connection, "verdict", values).to_arrow_table()
+            verdict, candidates = (
+                internal_sql().run(self.connection, name, values).to_arrow_table()
+                for name in ("verdict", "remedy_candidate")
+            )
             paths = self.rows("worst_first", paths, values | {"path": _worst(verdict)})
         since = ["--start", str(times.start)] if times != asked else []
         verdict = _with_next(verdict, since)
@@ -174,7 +190,7 @@ class _Questions:
             *(cure for word, cure in _RECORDED_BY.items() if word in verdict["lacks"].to_pylist()),
             *(
                 f"without the first {start.removesuffix('s')} s, a warm-up: the longest latencies"
-                " of some paths lie there (--start 0s reads them, too)"
+                " of some paths lie there, and what was lost in it (--start 0s reads them, too)"
                 for start in since[1:]
             ),
             *_outlier(self.run, paths.table.to_pylist()[0]),
@@ -193,15 +209,15 @@ class _Questions:
             slow_flow=self.rows("longest_piece", flow, values),
             waits=self.rows("own_wait", waits, values),
             losses=losses,
+            course=course,
+            candidates=candidates,
             steps=tuple(dict.fromkeys(steps)),
             notes=tuple(dict.fromkeys(notes)),
         )
 
-    def paths(self, asked: Slice) -> tuple[Slice, QueryResult]:
+    def paths(self, asked: Slice, paths: QueryResult) -> tuple[Slice, QueryResult]:
         """Return the paths, and the times that are read of them: a warm-up is left out."""
-        times, paths = asked, self.ask(_FIRST, asked, to=self.place)
-        if not _has_flows(paths):
-            raise self.nothing(asked)
+        times = asked
         # Of the flows that were read, as `compare` finds it.
         ((last_ns,),) = internal_sql().run(self.connection, "warm_up", {}).fetchall()
         if asked.start is None and last_ns is not None:

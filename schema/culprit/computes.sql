@@ -4,6 +4,7 @@
 -- next: query callbacks --each --slowest 5 --node {node}
 SELECT
     8 AS place,
-    *
+    *,
+    running_ns / measured_ns AS share
 FROM long_callback
 WHERE running_ns > 0.5 * measured_ns

@@ -1,7 +1,7 @@
 -- title: A node that began long after the others
 -- description: What came before is lost. What lost nothing is no culprit.
 -- grain: one row per node
--- reads: application_path, delivery, noticed
+-- reads: application_path, noticed, whole_delivery
 -- next: query topics --measure delivery --topic {topic_name}
 SELECT
     8 AS place,
@@ -37,7 +37,7 @@ JOIN (
         max(reasons['before_subscription'])::BIGINT AS missed,
         arg_max(published, reasons['before_subscription']) AS published
     FROM (
-        FROM delivery
+        FROM whole_delivery
         QUALIFY subscription_id = min(subscription_id) OVER (PARTITION BY subscriber, topic_name)
     )
     WHERE reasons['before_subscription'] > 0

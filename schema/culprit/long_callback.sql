@@ -1,5 +1,5 @@
--- description: Callbacks that run long on a path, or behind which others wait. How long: as long as
---     those that are to blame for half of the time above the usual.
+-- description: Callbacks that run long on a path, or behind which others wait. How long: as those
+--     that took much longer than usual, unless what is usual is too long.
 -- grain: one row per node and callback
 -- reads: callback_change, callback_cpu, callback_use, harm, held_message, noticed, thread_load
 -- kind: inline
@@ -17,23 +17,17 @@ WITH judged AS (
     CROSS JOIN noticed AS n
     WHERE h.matters
 ),
--- One that always takes long is not said to do so at times.
 named AS (
     SELECT
         *,
-        usual_ns < limit_ns AND long_ns IS NOT NULL AS is_at_times,
-        CASE
-            WHEN usual_ns >= limit_ns THEN usual_ns
-            WHEN long_ns IS NOT NULL THEN long_ns
-            ELSE run_ns
-        END AS takes_ns
+        coalesce(long_ns, CASE WHEN usual_ns >= limit_ns THEN usual_ns ELSE run_ns END) AS takes_ns
     FROM judged
 )
 SELECT
     h.node, h.callback, h.function, h.path, h.topic_name, h.harm_ns, h.p95_ns, h.lost, h.published,
     h.takes_ns AS run_ns,
     h.usual_ns,
-    CASE WHEN h.is_at_times THEN h.long_instances END AS long_calls,
+    h.long_instances AS long_calls,
     h.instances AS count,
     h.period_ns, h.load, h.per_take, h.waiting_node, h.waiting_callback, h.limit_ns,
     [h.node || h.callback, h.node || ' waits', coalesce(h.waiting_node, h.node) || ' waits']

@@ -3,23 +3,12 @@
 --     is named by program; a quota by its cgroup.
 -- grain: one row per node and path
 -- reads: application_path, blame, callback_cpu, callback_use, cpu_quota, cpu_user, noticed
--- next: query scheduling --measure preemption --node {node}
+-- next: query scheduling --measure programs
 SELECT
     5 AS place,
-    w.node,
-    arg_max_null(w.callback, w.mean_ns) AS callback,
+    unnest(arg_max(w, w.mean_ns)),
     arg_max_null(u.function, w.mean_ns) AS function,
-    w.path,
-    arg_max_null(w.topic_name, w.mean_ns) AS topic_name,
     sum(w.mean_ns)::BIGINT AS harm_ns,
-    arg_max(w.p95_ns, w.mean_ns) AS p95_ns,
-    arg_max_null(w.lost, w.mean_ns) AS lost,
-    arg_max_null(w.published, w.mean_ns) AS published,
-    arg_max_null(w.run_ns, w.mean_ns) AS run_ns,
-    arg_max_null(w.usual_ns, w.mean_ns) AS usual_ns,
-    arg_max_null(w.long_calls, w.mean_ns) AS long_calls,
-    arg_max_null(w.count, w.mean_ns) AS count,
-    arg_max_null(w.share, w.mean_ns) AS share,
     any_value(CASE WHEN q.node IS NULL AND p.reason IS NULL
         AND coalesce(p.used_cpus > l.of_callback, true) THEN p.program END) AS other,
     any_value(CASE WHEN q.node IS NULL THEN p.reason END) AS reason,
@@ -44,7 +33,8 @@ FROM (
         node, callback, path, topic_name,
         harm_ns * (waiting_ns / measured_ns) AS mean_ns,
         p95_ns, lost, published, run_ns, usual_ns, long_calls, count,
-        waiting_ns / measured_ns AS share
+        waiting_ns / measured_ns AS share,
+        running_ns, measured_ns, is_trend, since_ns, until_ns, before_ns, after_ns, occasion
     FROM long_callback
     WHERE waiting_ns > 0.5 * measured_ns
 ) AS w

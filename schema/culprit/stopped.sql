@@ -19,7 +19,16 @@ SELECT
     (c.after * c.after / 2 / p.length_ns)::BIGINT AS harm_ns,
     c.count AS lost,
     c.at_ns - r.start_ns AS since_ns,
-    c.since AS occasion,
+    coalesce(
+        c.since,
+        -- A timer of the time of a simulation ends with that, and what it publishes.
+        (
+            SELECT printf('/clock stopped at %.3f s', (any_value(k.at_ns) - r.start_ns) / 1e9)
+            FROM change AS k
+            WHERE k.kind = 'stop' AND k.subject = '/clock'
+                AND k.at_ns BETWEEN c.at_ns AND c.at_ns + c.after / c.count
+        )
+    ) AS occasion,
     [c.node || c.subject] AS claims
 FROM change AS c
 JOIN main.run AS r ON c.run_id = r.run_id

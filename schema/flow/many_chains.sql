@@ -27,4 +27,11 @@ reached AS (
     WHERE r.depth <= max_depth
     GROUP BY h.subscription_id, r.depth
 )
-SELECT only_run AS run_id FROM reached HAVING max(depth) > max_depth OR sum(number) > max_paths
+SELECT only_run AS run_id
+FROM (
+    SELECT
+        max(depth) AS deepest,
+        sum(number) AS chains
+    FROM reached
+)
+WHERE deepest > max_depth OR chains > max_paths

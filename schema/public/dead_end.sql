@@ -125,8 +125,7 @@ output AS (
     WHERE publisher_id NOT IN (
         SELECT p.publisher_id
         FROM derive.heartbeat_topic(runs) AS h
-        JOIN store.publisher AS p ON h.topic_name = p.topic_name
-        WHERE list_contains(runs, p.run_id)
+        JOIN store.publisher AS p ON h.run_id = p.run_id AND h.topic_name = p.topic_name
     )
 ),
 -- One after the other, and few that wait at the end.

@@ -13,7 +13,8 @@
 -- column: alike_id
 -- column: parent_path_id, depth
 -- column: publishers BIGINT[]  Publishers in order; below 0: not traced
--- column: subscriptions, topics
+-- column: subscriptions BIGINT[]  Subscriptions in order
+-- column: topics
 -- column: routes BIGINT[][]  For each topic the calling node (negative: its process; 0: not known),
 --     then the services in order (0: not known); empty: no service led to it
 -- column: path VARCHAR  Nodes and topics in order, services in brackets, for people

@@ -8,6 +8,13 @@
 -- grain: one row per reason
 -- severity: warning
 -- when: staging.sample_text
+WITH timed AS (
+    SELECT
+        at_ns + 60_000_000_000 < (SELECT min(start_ns) FROM staging.trace)
+        OR at_ns - 60_000_000_000 > (SELECT max(end_ns) FROM staging.trace) AS is_outside
+    FROM staging.sample_text
+    WHERE is_of_time AND clock_key IS NOT NULL
+)
 SELECT
     count(*) AS count,
     printf('%d samples of functions have times of another clock, or no time', count(*)) AS detail
@@ -18,7 +25,7 @@ UNION ALL
 SELECT
     count(*),
     printf(
-        '%d samples of functions lack the id of their process or thread, or their time; perf script'
+        '%d samples or lines lack the id of their process or thread, or their time; perf script'
         || ' --header --ns -F pid,tid,cpu,time,event,period,ip,sym,dso > perf.script writes them',
         count(*)
     )
@@ -47,7 +54,18 @@ HAVING count(*) > 0
 UNION ALL
 SELECT
     count(*),
+    printf(
+        '%d samples of functions are of times more than a minute outside of the recording: of '
+        || 'another run, or another boot of the machine',
+        count(*)
+    )
+FROM timed
+WHERE is_outside
+HAVING count(*) > 0
+UNION ALL
+SELECT
+    count(*),
     printf('none of %d samples of functions is of a process that recorded events', count(*))
-FROM staging.sample_text
-WHERE is_of_time AND clock_key IS NOT NULL
+FROM timed
+WHERE is_outside IS NOT TRUE
 HAVING count(*) > 0 AND (SELECT count(*) FROM staging.stack_sample) = 0

@@ -16,17 +16,13 @@ WITH seen AS MATERIALIZED (
         EXISTS (FROM store.executor_state WHERE run_id = $run_id) AS has_states,
         EXISTS (FROM store.request WHERE run_id = $run_id) AS has_requests,
         -- Those were enabled, and some client library or executor has none.
-        EXISTS (
-            FROM store.finding WHERE run_id = $run_id AND name = 'process_without_rclcpp'
-        ) AS is_without_rclcpp,
-        EXISTS (
-            FROM store.finding
-            WHERE run_id = $run_id
-                AND name IN (
-                    'executor_without_events', 'executor_events_left_out', 'agnocast_callbacks'
-                )
-        ) AS is_without_executor
-    FROM store.run
+        count(*) FILTER (name = 'process_without_rclcpp') > 0 AS is_without_rclcpp,
+        count(*) FILTER (name IN (
+            'executor_without_events', 'executor_events_left_out', 'agnocast_callbacks'
+        )) > 0
+        OR EXISTS (FROM store.executor WHERE run_id = $run_id AND kind = 'events')
+            AS is_without_executor
+    FROM store.finding
     WHERE run_id = $run_id
 )
 SELECT

@@ -37,17 +37,14 @@ bound AS (
 ),
 -- A process that was started again shares nothing with what it was before.
 placed AS (
-    SELECT run_id, thread_id, cpu, host_id
+    SELECT a.run_id, a.thread_id, a.cpu, a.host_id
     FROM bound AS a
-    WHERE EXISTS (
-        SELECT 1
-        FROM bound AS b
-        WHERE b.host_id = a.host_id
-            AND b.cpu = a.cpu
-            AND b.thread_id <> a.thread_id
-            AND b.start_ns < a.end_ns
-            AND b.end_ns > a.start_ns
-    )
+    SEMI JOIN bound AS b
+        ON a.host_id = b.host_id
+        AND a.cpu = b.cpu
+        AND a.thread_id <> b.thread_id
+        AND b.start_ns < a.end_ns
+        AND b.end_ns > a.start_ns
 )
 SELECT
     a.run_id, a.host_id,

@@ -78,7 +78,9 @@ FROM (
             '%s: %s%s', change, headline,
             CASE
                 -- Of a pause or of what never came, no age is measured.
-                WHEN kind IN ('hangs', 'late_start', 'never_matched', 'restart', 'untaken')
+                WHEN kind IN (
+                    'hangs', 'late_start', 'never_matched', 'restart', 'unfinished', 'untaken'
+                )
                     THEN ''
                 WHEN change IN ('more', 'less') THEN printf(
                     ' (data %s older, before %s)', main.duration_text(b_harm_ns),

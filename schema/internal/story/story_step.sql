@@ -17,7 +17,8 @@
 -- column: what VARCHAR  What it is about; of a stage, what made it wait
 -- column: function VARCHAR  Function of the callback that it is
 -- column: share DOUBLE [share]  For so much of the stage
--- column: request_id BIGINT  Goal that was sent, or call of a service; of several the longest
+-- column: request_id BIGINT  Goal that was sent, or call of a service, that it is about; of several
+--     the longest
 -- column: publication_id BIGINT  Message
 WITH goal AS MATERIALIZED (FROM main.goal),
 answer AS (
@@ -122,7 +123,8 @@ meanwhile AS (
         b.id,
         l.callback || ' of ' || l.node AS what,
         l.function, b.share,
-        false AS is_done
+        false AS is_done,
+        NULL AS request_id
     FROM main.callback_beside('stage') AS b
     JOIN callback_name AS l ON b.alike_id = l.callback_id
     UNION ALL
@@ -136,7 +138,8 @@ meanwhile AS (
                 / (s.end_ns - s.start_ns),
             1
         ),
-        true
+        true,
+        arg_max(d.request_id, d.end_ns - d.start_ns)
     FROM stage AS s
     JOIN done AS d ON d.start_ns < s.end_ns AND d.end_ns > s.start_ns AND s.id <> 'result taken'
     GROUP BY s.id, s.start_ns, s.end_ns, d.name, d.node
@@ -147,62 +150,65 @@ most AS (
     QUALIFY row_number() OVER (
         PARTITION BY id ORDER BY is_done AND share > 0.5 DESC, share DESC, what
     ) = 1
+),
+told AS (
+    SELECT
+        s.end_ns AS at_ns,
+        s.id AS step,
+        s.is_stage,
+        s.end_ns - s.start_ns AS took_ns,
+        s.node,
+        CASE WHEN s.is_stage AND s.start_ns IS NULL THEN a.name ELSE m.what END AS what,
+        m.function, m.share, m.request_id
+    FROM stage AS s
+    CROSS JOIN asked AS a
+    LEFT JOIN most AS m ON s.id = m.id
+    UNION ALL BY NAME
+    SELECT
+        min(d.start_ns) AS at_ns,
+        'asks' AS step,
+        false AS is_stage,
+        max(d.end_ns - d.start_ns) AS took_ns,
+        any_value(a.server) AS node,
+        d.name || coalesce(' of ' || d.node, '')
+        || CASE WHEN count(*) > 1 THEN printf(', %d times', count(*)) ELSE '' END AS what,
+        arg_max(d.request_id, d.end_ns - d.start_ns) AS request_id
+    FROM done AS d
+    CROSS JOIN asked AS a
+    GROUP BY d.name, d.node
+    UNION ALL BY NAME
+    SELECT
+        min(b.start_ns) AS at_ns,
+        'first command' AS step,
+        false AS is_stage,
+        any_value(a.server) AS node,
+        arg_min(u.topic_name, b.start_ns) AS what,
+        arg_min(b.publication_id, b.start_ns) AS publication_id
+    FROM asked AS a
+    JOIN main.publisher AS u ON a.server_node_id = u.node_id
+    JOIN main.publication AS b
+        ON u.publisher_id = b.publisher_id AND b.start_ns BETWEEN a.answered_ns AND a.until_ns
+    WHERE NOT u.is_internal
+        AND NOT contains(u.topic_name, '/_action/')
+        AND NOT EXISTS (
+            FROM main.publication AS e
+            WHERE e.publisher_id = u.publisher_id
+                AND e.start_ns BETWEEN a.asked_ns - 1_000_000_000 AND a.asked_ns
+        )
+    HAVING count(*) > 0
+    UNION ALL BY NAME
+    SELECT
+        min(g.sent_ns) AS at_ns,
+        'next goal' AS step,
+        false AS is_stage,
+        any_value(a.client) AS node,
+        arg_min(g.goal_id, g.sent_ns) AS request_id
+    FROM asked AS a
+    JOIN goal AS g
+        ON a.action_client_id = g.action_client_id
+        AND g.sent_ns > a.sent_ns
+        AND g.sent_ns < coalesce(a.result_taken_ns, a.until_ns)
+    HAVING count(*) > 0
 )
-SELECT
-    s.end_ns AS at_ns,
-    s.id AS step,
-    s.is_stage,
-    s.end_ns - s.start_ns AS took_ns,
-    s.node,
-    CASE WHEN s.is_stage AND s.start_ns IS NULL THEN a.name ELSE m.what END AS what,
-    m.function, m.share
-FROM stage AS s
-CROSS JOIN asked AS a
-LEFT JOIN most AS m ON s.id = m.id
-UNION ALL BY NAME
-SELECT
-    min(d.start_ns) AS at_ns,
-    'asks' AS step,
-    false AS is_stage,
-    max(d.end_ns - d.start_ns) AS took_ns,
-    any_value(a.server) AS node,
-    d.name || coalesce(' of ' || d.node, '')
-    || CASE WHEN count(*) > 1 THEN printf(', %d times', count(*)) ELSE '' END AS what,
-    arg_max(d.request_id, d.end_ns - d.start_ns) AS request_id
-FROM done AS d
-CROSS JOIN asked AS a
-GROUP BY d.name, d.node
-UNION ALL BY NAME
-SELECT
-    min(b.start_ns) AS at_ns,
-    'first command' AS step,
-    false AS is_stage,
-    any_value(a.server) AS node,
-    arg_min(u.topic_name, b.start_ns) AS what,
-    arg_min(b.publication_id, b.start_ns) AS publication_id
-FROM asked AS a
-JOIN main.publisher AS u ON a.server_node_id = u.node_id
-JOIN main.publication AS b
-    ON u.publisher_id = b.publisher_id AND b.start_ns BETWEEN a.answered_ns AND a.until_ns
-WHERE NOT u.is_internal
-    AND NOT contains(u.topic_name, '/_action/')
-    AND NOT EXISTS (
-        FROM main.publication AS e
-        WHERE e.publisher_id = u.publisher_id
-            AND e.start_ns BETWEEN a.asked_ns - 1_000_000_000 AND a.asked_ns
-    )
-HAVING count(*) > 0
-UNION ALL BY NAME
-SELECT
-    min(g.sent_ns) AS at_ns,
-    'next goal' AS step,
-    false AS is_stage,
-    any_value(a.client) AS node,
-    arg_min(g.goal_id, g.sent_ns) AS request_id
-FROM asked AS a
-JOIN goal AS g
-    ON a.action_client_id = g.action_client_id
-    AND g.sent_ns > a.sent_ns
-    AND g.sent_ns < coalesce(a.result_taken_ns, a.until_ns)
-HAVING count(*) > 0
+FROM told
 ORDER BY step = 'sent' DESC, at_ns, is_stage DESC, step

@@ -19,9 +19,9 @@ WITH path AS (
         FROM e2e_latency
     )
     -- A service that is called has brackets.
-    WHERE steps[2] LIKE '/%' AND steps[-2] LIKE '/%'
+    WHERE steps[2] LIKE '/%' AND steps[-2] LIKE '/%' AND steps[2] <> steps[-2]
     GROUP BY ALL
-    HAVING first <> last AND min(pairs) >= $least_values
+    HAVING min(pairs) >= $least_values
 ),
 timer AS (
     SELECT

@@ -21,7 +21,7 @@ WITH instance AS (
     JOIN callback_use AS u ON n.node = u.node AND n.callback = u.callback
     WHERE list_contains($runs, i.run_id)
         AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
-        AND 2 * (i.end_ns - i.start_ns) > coalesce(u.long_ns, 0)
+        AND i.end_ns - i.start_ns > u.longer_ns
 ),
 seen AS (
     SELECT

@@ -25,5 +25,5 @@ LEFT JOIN (
     ON i.callback_instance_id = g.callback_instance_id
 WHERE list_contains($runs, i.run_id)
     AND i.start_ns >= $start_ns AND i.start_ns < $end_ns
-    AND 2 * (i.end_ns - i.start_ns) > coalesce(u.long_ns, 0)
+    AND i.end_ns - i.start_ns > u.longer_ns
 GROUP BY n.node, n.callback

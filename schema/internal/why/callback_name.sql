@@ -45,19 +45,8 @@ named AS (
 SELECT
     c.callback_id, n.node,
     l.label AS callback,
-    -- A Python function has its module in front, a C++ function arguments and template parameters,
-    -- one within the other. Of a bound method C++ keeps only the class, of a lambda where it
-    -- stands. What triggers a lambda of Python names it.
-    CASE
-        WHEN b.is_job THEN NULL
-        WHEN contains(f.symbol, '<lambda>') THEN NULL
-        WHEN regexp_matches(f.symbol, '^[^\s:(<]+:[^:]')
-            THEN replace(regexp_replace(f.symbol, '^[^:]*:', ''), '.<locals>', '')
-        WHEN NOT regexp_matches(f.symbol, '::\*|\{lambda') THEN nullif(trim(list_reduce(
-            [f.symbol, '', '', ''],
-            lambda name, _: regexp_replace(name, '\([^()]*\)|<[^<>]*>', '', 'g')
-        )), '')
-    END AS function,
+    -- What triggers a lambda of Python names it.
+    CASE WHEN b.is_job IS NOT true THEN derive.function_name(f.symbol) END AS function,
     f.source, c.process_id,
     coalesce(b.is_job, false) AS is_job
 FROM main.callback AS c

@@ -14,8 +14,10 @@
 -- column: usual_ns BIGINT [ns]  Median duration
 -- column: mean_ns
 -- column: run_ns BIGINT [ns]  95 % of its instances took no longer
--- column: long_instances BIGINT  Those that took much longer than usual; NULL: none
--- column: long_ns BIGINT [ns]  How long these take: half of their time goes to longer ones
+-- column: long_instances BIGINT  Those that took much longer than usual; NULL: none, or what is
+--     usual is too long
+-- column: long_ns BIGINT [ns]  Their median duration
+-- column: longer_ns BIGINT [ns]  What they took longer than; 0: there are none, all count
 -- column: period_ns BIGINT [ns]  Mean time from one start to the next; NULL: it ran once
 -- column: limit_ns BIGINT [ns]  Delay of it that an engineer notices
 WITH instance AS (
@@ -46,11 +48,20 @@ callback AS (
     FROM instance
     GROUP BY node, callback
 ),
--- Longer than those that are to blame for half of the time that is more than three times the usual.
+limited AS (
+    SELECT
+        c.*,
+        (c.last_ns - c.first_ns) // nullif(c.instances - 1, 0) AS period_ns,
+        greatest(n.least_ns, least(n.late_ns, n.of_period * period_ns))::BIGINT AS limit_ns
+    FROM callback AS c
+    CROSS JOIN noticed AS n
+),
+-- At least half as long as those that are to blame for half of the time that is more than three
+-- times the usual.
 longest AS (
     SELECT
         node, callback,
-        max(run_ns) FILTER (WHERE 2 * longer_ns >= all_ns) AS long_ns
+        max(run_ns) FILTER (WHERE 2 * longer_ns >= all_ns) // 2 AS longer_ns
     FROM (
         SELECT
             i.node, i.callback, i.run_ns,
@@ -71,18 +82,17 @@ SELECT
     c.mean_ns,
     c.quantiles[2] AS run_ns,
     l.long_instances, l.long_ns,
-    (c.last_ns - c.first_ns) // nullif(c.instances - 1, 0) AS period_ns,
-    greatest(n.least_ns, least(n.late_ns, n.of_period * period_ns))::BIGINT AS limit_ns
-FROM callback AS c
-CROSS JOIN noticed AS n
+    coalesce(l.longer_ns, 0) AS longer_ns,
+    c.period_ns, c.limit_ns
+FROM limited AS c
 LEFT JOIN (
     SELECT
-        i.node, i.callback,
-        any_value(l.long_ns) AS long_ns,
+        i.node, i.callback, l.longer_ns,
+        quantile_disc(i.run_ns, 0.5) AS long_ns,
         count(*) AS long_instances
     FROM instance AS i
     JOIN longest AS l ON i.node = l.node AND i.callback = l.callback
-    WHERE 2 * i.run_ns > l.long_ns
-    GROUP BY i.node, i.callback
+    WHERE i.run_ns > l.longer_ns
+    GROUP BY i.node, i.callback, l.longer_ns
 ) AS l
-    ON c.node = l.node AND c.callback = l.callback
+    ON c.node = l.node AND c.callback = l.callback AND c.quantiles[1] < c.limit_ns

@@ -25,7 +25,7 @@ touching AS (
         AND f.severity IN ('error', 'warning')
         AND f.name NOT IN (
             'busy_waiting', 'executor_preempted', 'hanging_callback', 'never_taken', 'not_woken',
-            'silent_topic', 'started_late', 'stopped_timer', 'untaken_request'
+            'silent_topic', 'started_late', 'stopped_timer', 'unfinished_goal', 'untaken_request'
         )
         AND (f.name <> 'dead_end' OR list_contains((SELECT begins FROM step), n.full_name))
         AND (

@@ -103,11 +103,19 @@ said AS (
                 ''
             )
             WHEN 'untaken' THEN reason
+            WHEN 'unfinished' THEN reason
             WHEN 'burst' THEN printf(
                 '%s sends up to %d messages on %s at once, every %s',
                 coalesce(long_name, 'it'), count, topic, main.duration_text(period_ns)
             )
-            WHEN 'computes' THEN printf('%s computes %s%s', long_name, run, at_times)
+            WHEN 'computes' THEN printf(
+                '%s computes %s%s%s', long_name,
+                CASE
+                    WHEN share < nearly_all THEN printf('for %.0f %% of ', 100 * share)
+                    ELSE ''
+                END,
+                run, at_times
+            )
             WHEN 'garbage_collection' THEN printf(
                 '%s collects garbage for %.0f %% of %s%s', long_name, 100 * share, run, at_times
             )
@@ -189,7 +197,8 @@ said AS (
                         ELSE 'messages on' END,
                     topic, main.duration_text(p95_ns),
                     CASE WHEN is_supposed THEN ' for the next one: its executor is not woken'
-                        WHEN count IS NULL THEN '' ELSE ' while its executor spins' END
+                        WHEN count IS NULL THEN ''
+                        ELSE ': its executor polls without a pause' END
                 )
                 ELSE printf('%d of %d messages on %s were overwritten', lost, published, topic)
             END
@@ -203,11 +212,13 @@ said AS (
                 CASE
                     WHEN kind = 'hangs' AND is_supposed THEN 'a synchronous call: let the callback'
                         ' return, or give the client a callback group and a thread of its own'
-                    WHEN kind IN ('hangs', 'restart', 'never_matched', 'late_start', 'untaken')
+                    WHEN kind IN (
+                        'hangs', 'restart', 'never_matched', 'late_start', 'unfinished', 'untaken'
+                    )
                         THEN NULL
                     ELSE printf(
                         'data on %s are %s older by it on average',
-                        regexp_replace(path, ' → .* → ', ' → … → '), main.duration_text(harm_ns)
+                        regexp_replace(path, ' → .+ → .+ → ', ' → … → '), main.duration_text(harm_ns)
                     )
                 END,
                 array_to_string(
@@ -234,7 +245,11 @@ said AS (
                             CASE WHEN kind = 'stopped' THEN coalesce(
                                 occasion,
                                 CASE WHEN starts_with(callback, 'Timer')
-                                    THEN 'cancelled, or no executor looks at it: not known' END
+                                    THEN 'cancelled, no executor looks at it, or its clock stands:'
+                                        ' not known' END
+                            ) END,
+                            CASE WHEN kind = 'no_cpu' THEN printf(
+                                'it computes for %.0f %% of it', 100 * running_ns / measured_ns
                             ) END,
                             CASE WHEN kind = 'callback' THEN printf(
                                 'on a CPU for %.0f %% of it, ready without one for %.0f %%',
@@ -249,8 +264,9 @@ said AS (
                                 'its thread is asked for %.0f %% of its time', 100 * load
                             ) END,
                             printf(
-                                '%.3g Hz come in, %.3g Hz are taken', 1e9 * per_take / period_ns,
-                                1e9 / period_ns
+                                '%s come in, %s are taken',
+                                derive.rate_text(1e9 * per_take / period_ns),
+                                derive.rate_text(1e9 / period_ns)
                             ),
                             CASE
                                 WHEN is_held THEN printf('messages on %s come when it ends', topic)

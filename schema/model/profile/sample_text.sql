@@ -20,8 +20,10 @@ judged AS (
         *,
         CASE WHEN event <> '' THEN regexp_matches(event, '-clock|cycles') END AS is_of_time
     FROM parsed
-    -- A name may have ends of lines: only the last of them has an event.
-    WHERE event <> '' OR regexp_matches(head, '\d+ .*\S:(\s+[0-9a-f]+ .*)?\s*$')
+    -- A name, of 15 bytes at most, may have ends of lines: only the last of them has an event.
+    WHERE event <> ''
+        OR regexp_matches(head, '\d+ .*\S:(\s+[0-9a-f]+ .*)?\s*$')
+        OR length(head) > 15
 )
 SELECT
     p.is_of_time,

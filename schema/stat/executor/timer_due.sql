@@ -21,10 +21,10 @@ WITH RECURSIVE call AS MATERIALIZED (
         (i.start_ns - t.created_ns) // greatest(10 * t.period_ns, 1000000000) AS slice,
         -- What waking takes, and clocks drift in a period.
         least(t.period_ns // 10, 1000000 + t.period_ns // 10000) AS slack_ns,
-        row_number() OVER in_time AS number,
-        lag(i.start_ns) OVER in_time AS previous_ns,
+        row_number() OVER of_calls AS number,
+        lag(i.start_ns) OVER of_calls AS previous_ns,
         -- Of lag with an offset, older versions of DuckDB cannot read the definition.
-        any_value(i.start_ns) OVER (in_time ROWS BETWEEN 2 PRECEDING AND 2 PRECEDING)
+        any_value(i.start_ns) OVER (of_calls ROWS BETWEEN 2 PRECEDING AND 2 PRECEDING)
             AS earlier_ns
     FROM store.callback_instance AS i
     JOIN store.callback AS c ON i.callback_id = c.callback_id
@@ -36,7 +36,7 @@ WITH RECURSIVE call AS MATERIALIZED (
         FROM store.executor
         WHERE executor_id IN (SELECT executor_id FROM query_table(executors))
     )
-    WINDOW in_time AS (PARTITION BY i.callback_id ORDER BY i.start_ns, i.callback_instance_id)
+    WINDOW of_calls AS (PARTITION BY i.callback_id ORDER BY i.start_ns, i.callback_instance_id)
 ),
 slice AS MATERIALIZED (
     SELECT
@@ -106,12 +106,12 @@ placed AS (
 ahead AS (
     SELECT
         *,
-        own_slot - lag(own_slot) OVER in_time AS slots,
-        max(number - own_slot) OVER (in_time ROWS UNBOUNDED PRECEDING) AS ahead_before,
-        max(number - own_slot) OVER (in_time ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING)
+        own_slot - lag(own_slot) OVER of_slots AS slots,
+        max(number - own_slot) OVER (of_slots ROWS UNBOUNDED PRECEDING) AS ahead_before,
+        max(number - own_slot) OVER (of_slots ROWS BETWEEN CURRENT ROW AND UNBOUNDED FOLLOWING)
             AS ahead_after
     FROM placed
-    WINDOW in_time AS (PARTITION BY callback_id ORDER BY number)
+    WINDOW of_slots AS (PARTITION BY callback_id ORDER BY number)
 ),
 -- A call shortly before an instant of the grid was for that instant, or for the one before it,
 -- almost a period late. In the second case the instant is still to come.
@@ -185,9 +185,9 @@ around AS (
         ) AS is_certain
     FROM kept
     WINDOW
-        in_time AS (PARTITION BY callback_id ORDER BY number),
-        behind AS (in_time ROWS BETWEEN 10 PRECEDING AND CURRENT ROW),
-        ahead AS (in_time ROWS BETWEEN CURRENT ROW AND 10 FOLLOWING)
+        of_grid AS (PARTITION BY callback_id ORDER BY number),
+        behind AS (of_grid ROWS BETWEEN 10 PRECEDING AND CURRENT ROW),
+        ahead AS (of_grid ROWS BETWEEN CURRENT ROW AND 10 FOLLOWING)
 )
 SELECT callback_instance_id, due_ns, latest_ns
 FROM around
