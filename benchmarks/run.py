@@ -28,7 +28,7 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from pathlib import Path
 
 EVENTS_PER_FACTOR = 66_000
@@ -185,7 +185,7 @@ def table(trace: str, directory: Path, what: str, arguments: argparse.Namespace)
         events, samples = measure(trace, database, arguments)
         rounds.append(samples)
     lines = [
-        f"{datetime.now(UTC):%Y-%m-%d}: {events:,} events{what}, {os.cpu_count()} cores "
+        f"{datetime.now(timezone.utc):%Y-%m-%d}: {events:,} events{what}, {os.cpu_count()} cores "
         f"({platform.machine()}), Python {platform.python_version()}, memory limit "
         f"{arguments.memory_limit or 'as needed'}, database "
         f"{database.stat().st_size / 1e6:,.0f} MB, {arguments.runs} runs, "

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, Unpack, overload
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar, overload
 
+from msgflow.backports import Unpack
 from msgflow.errors import QueryError, UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import choose_query, load_queries, queries_meant
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from msgflow.export.mcap import ExportedMcap
     from msgflow.export.otlp import ExportedTraces
     from msgflow.export.perfetto import PerfettoTrace
+    from msgflow.export.timing_model import TimingModel
     from msgflow.export.view_files import ExportedView
     from msgflow.ingest import IngestProgress, IngestReport
     from msgflow.links.annotations import AppliedLinks
@@ -43,6 +46,7 @@ if TYPE_CHECKING:
     from msgflow.query.moment import Moment
     from msgflow.query.story import Story
     from msgflow.query.why import Explanation
+    from msgflow.replay.remedies import Remedies
     from msgflow.result.query_result import QueryResult
     from msgflow.sql.header import Header
     from msgflow.sql.value import Value
@@ -101,8 +105,18 @@ class Database:
     def __enter__(self) -> Database:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: object, error: BaseException | None, *_: object) -> None:
+        try:
+            if error is not None and self._connection is not None:
+                import duckdb
+
+                from msgflow.db.connection import require_ours
+
+                # Views that somebody changed may lack what a question reads.
+                if isinstance(error, duckdb.Error):
+                    require_ours(self._connection, self.path)
+        finally:
+            self.close()
 
     def close(self) -> None:
         """Close the file; a later question opens it again."""
@@ -172,6 +186,7 @@ class Database:
         kernel: bool = False,
         profile: str | None = None,
         cpu_time: bool = True,
+        on: Sequence[str] = (),
         note: Callable[[str], None] = warnings.warn,
     ) -> IngestReport:
         """Record a ROS 2 system with LTTng, and ingest it as the run with the directory's name.
@@ -186,17 +201,21 @@ class Database:
             kernel: also record what the scheduler does.
             profile: also sample functions: '99' times a second, or '99:dwarf'.
             cpu_time: also read the clocks of threads, where perf_event_open is allowed.
+            on: machines of ssh, 'robot' or 'user@robot', and 'container:NAME', to record on, too;
+                clocks are brought together by messages.
             note: gets sentences about what is wrong with the recording.
 
         Raises:
             RecordingError: LTTng is missing or refuses, the directory is in use, or the disk full.
-            UsageError: there is no such program, or no such rate.
+            UsageError: there is no such program or rate, or not the name of a machine.
             TraceError: nothing of ROS 2 was recorded.
         """
         from msgflow.record.perf import read_rate
         from msgflow.record.recording import record
+        from msgflow.record.remote import read_places
         from msgflow.record.session import Channel
 
+        places = read_places(on)
         place = Path(directory).absolute()
         recorded = record(
             place,
@@ -207,12 +226,17 @@ class Database:
             kernel=kernel,
             profile=None if profile is None else read_rate(profile),
             cpu_time=cpu_time,
+            places=places,
             note=note,
             show=lambda status: None,
         )
         if recorded.exit_code:
             note(f"{program[0]} ended with exit code {recorded.exit_code}")
-        return self.ingest(place)
+        return self.ingest(
+            place,
+            hosts=recorded.hosts,
+            clock_sync="messages" if places else "none",
+        )
 
     def ingest(
         self,
@@ -519,12 +543,85 @@ class Database:
         """
         from msgflow.query.moment import explain_moment
         from msgflow.query.why import explain
+        from msgflow.replay.remedies import suggested
 
         one = self._ask(Slice(part.get("run")).one_run, "an explanation")
         times = Slice(one.run_id, part.get("start"), part.get("end"))
         if at is not None:
             return self._ask(explain_moment, one, times, at, place)
-        return self._ask(explain, one, times, place)
+        found = self._ask(explain, one, times, place)
+        return replace(found, suggestion=self._ask(suggested, found))
+
+    def remedies(
+        self,
+        place: str | None = None,
+        *,
+        progress: Callable[[int, int, str], None] = lambda *_: None,
+        **part: Unpack[SliceWords],
+    ) -> Remedies:
+        """Try what may make a topic's data sooner, in replays of the run: the best first.
+
+        Args:
+            place: topic or node where the flows end; a glob is possible. By default all ends.
+            progress: gets the number of a replay, how many there are, and what is tried.
+            **part: what to read, see `msgflow.Slice`; one run.
+
+        Raises:
+            UsageError: not exactly one run, or no such place or time.
+            NoFlowError: no flow arrives there.
+        """
+        from msgflow.query.why import explain
+        from msgflow.replay.predict import Predictor
+        from msgflow.replay.remedies import find_remedies
+
+        one = self._ask(Slice(part.get("run")).one_run, "an explanation")
+        times = Slice(one.run_id, part.get("start"), part.get("end"))
+        found = self._ask(explain, one, times, place)
+        predictor = self._ask(Predictor, one)
+        # Not by `_ask`: it is no statement of DuckDB that Ctrl-C has to end.
+        return find_remedies(self.connection, predictor, found, progress)
+
+    def predict(
+        self,
+        place: str | None = None,
+        *,
+        changes: Sequence[str] = (),
+        run: str | int | None = None,
+        keep: str | Path | None = None,
+    ) -> QueryResult:
+        """Replay a run with changes, and return what they do to each path; docs/replay.md has them.
+
+        Without changes it shows how near a replay is to the recording.
+
+        Args:
+            place: only paths that end at this topic or node; a glob is possible.
+            changes: such as 'threads(/perception)=2' or 'duration(/detector on_image)*0.7'.
+            run: a name or an id; the latest run when None.
+            keep: database to write, with the run and the same as it was replayed, to compare them.
+
+        Raises:
+            UsageError: no such run, or a change that cannot be read, or that changes nothing.
+        """
+        from msgflow.replay.change import changed, read_change, require_effect
+        from msgflow.replay.engine import Replay
+        from msgflow.replay.predict import Predictor
+        from msgflow.replay.predicted_run import write_predicted
+        from msgflow.replay.remedies import predicted_paths
+
+        wanted = [read_change(text) for text in changes]
+        one = self._ask(Slice(run).one_run, "a replay")
+        predictor = self._ask(Predictor, one)
+        for change in wanted:
+            require_effect(predictor.system, change)
+        found = predicted_paths(self.connection, one, predictor, wanted, place)
+        if keep is None:
+            return found
+        system = changed(predictor.system, wanted)
+        replay = Replay(system)
+        replay.latencies()
+        name = self._ask(write_predicted, one, system, replay, wanted, Path(keep))
+        step = shlex.join(["msgflow", "compare", one.name, name, "--db", str(keep)])
+        return replace(found, notes=[*found.notes, f"kept as {name}: {step}"])
 
     def story(
         self,
@@ -593,7 +690,9 @@ class Database:
         from msgflow.export.flow import read_flow
         from msgflow.query.story import goal_meant
 
-        if goal is not None and request_id is None:
+        if goal is not None:
+            if request_id is not None:
+                raise UsageError("a flow starts from one thing: a goal or a request", "give one")
             request_id, run = self._ask(goal_meant, goal, run), None
         given = (publication_id, take_id, callback_instance_id, request_id, response_id)
         start = self._ask(_start, place, given, at, run)
@@ -1055,6 +1154,27 @@ class Database:
         from msgflow.export.folded import write_folded
 
         return self._ask(write_folded, Path(output), Slice(**part))
+
+    def export_timing_model(
+        self, output: str | Path = "timing.yaml", **part: Unpack[SliceWords]
+    ) -> TimingModel:
+        """Write executors, callbacks and chains of a run as YAML, for analyses of response times.
+
+        Callbacks have their periods, groups, distributions of duration and CPU time, and the
+        longest observed response beside the bound of a single-threaded executor (Blaß et al., RTSS
+        2021), with the longest observed durations.
+
+        Args:
+            output: the file; one that exists is replaced.
+            **part: what to read, see `msgflow.Slice`; one run.
+
+        Raises:
+            UsageError: not exactly one run, a time that cannot be read, or a file that cannot be
+                written.
+        """
+        from msgflow.export.timing_model import write_timing_model
+
+        return self._ask(write_timing_model, Path(output), Slice(**part))
 
     def export_mcap(
         self,

@@ -26,6 +26,8 @@
 -- column: messages BIGINT          Messages at the end that reflect a root
 -- column: pairs BIGINT             Pairs of root and arrival whose latency is known
 -- column: per_root DOUBLE         Messages that reflect a root which arrived, on average
+-- column: roots_by_messages VARCHAR  Of the roots that arrived, how many became how many messages
+--     at the end: '1: 25, 3: 110' are 25 with one message and 110 with three
 -- column: first_min_ns BIGINT [ns]     Latency of the first arrival of each root: the shortest
 -- column: first_median_ns BIGINT [ns]  Its median
 -- column: first_mean_ns BIGINT [ns]    Its mean
@@ -51,7 +53,7 @@
 -- brief: first_topic, last_topic, node, first_median_ns, last_max_ns, reached (even 0), lost,
 --     ambiguous, loss_affected, dropped, newest_max_ns, per_root, roots, first_max_ns,
 --     last_median_ns, newest_median_ns, first_p95_ns, last_p95_ns, newest_p95_ns, paths,
---     superseded, no_output, not_connected, unknown, cut_by_recording
+--     superseded, no_output, not_connected, unknown, cut_by_recording, roots_by_messages
 -- note: clocks
 WITH flow AS (
     SELECT
@@ -68,7 +70,10 @@ arrival AS MATERIALIZED (
         *,
         CASE WHEN is_first THEN latency_ns END AS first_ns,
         CASE WHEN is_last THEN latency_ns END AS last_ns,
-        CASE WHEN is_newest THEN latency_ns END AS newest_ns
+        CASE WHEN is_newest THEN latency_ns END AS newest_ns,
+        count(take_id) OVER (
+            PARTITION BY run_id, first_topic, last_topic, node, root_kind, root_id
+        ) AS root_messages
     FROM main.end_to_end_between('flow')
 ),
 measured AS (
@@ -81,6 +86,8 @@ measured AS (
         count(DISTINCT take_id) AS messages,
         count(latency_ns) AS pairs,
         count(take_id) AS arrivals,
+        map_entries(histogram(root_messages) FILTER (WHERE is_first AND take_id IS NOT NULL))
+            AS root_counts,
         main.spread(first_ns) AS firsts,
         -- Of equally long ones the first, and of its arrivals the first.
         max(struct_pack(latency_ns := first_ns, before_ns := -root_ns, before_take := -take_id))
@@ -116,6 +123,9 @@ SELECT
     coalesce(m.number['cut_by_recording'], 0) AS cut_by_recording,
     coalesce(COLUMNS(['loss_affected', 'ambiguous', 'messages', 'pairs']), 0),
     round(m.arrivals / nullif(m.number['reached'], 0), 2) AS per_root,
+    array_to_string(
+        [printf('%d: %d', each.key, each.value) FOR each IN m.root_counts], ', '
+    ) AS roots_by_messages,
     m.firsts.min_ns AS first_min_ns,
     m.firsts.median_ns AS first_median_ns,
     m.firsts.mean_ns AS first_mean_ns,

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any
+
+from msgflow.backports import StrEnum
 
 NOTHING = "nothing stands out"
 """What the only headline says of a healthy robot."""

@@ -23,6 +23,7 @@ from msgflow.db.memory import bound, bound_process, default_limit, set_memory_li
 from msgflow.errors import QueryError, TraceError, UsageError
 from msgflow.result.query_result import QueryResult
 from msgflow.sql.statement import internal_sql
+from msgflow.text.installation import install_command
 from msgflow.trace.extraction import LIMIT_VARIABLE, limit_of
 from msgflow.trace.regular_file import irregular
 
@@ -82,7 +83,7 @@ def read_bag(bag: Path, *, memory_limit: str | None = None) -> Iterator[pa.Recor
     if importlib.util.find_spec("rosbags") is None:
         raise UsageError(
             "the package that reads bags is not installed — rosbags",
-            "pip install rosbags; or in a checkout of msgflow: uv tool install '.[bag]'",
+            install_command("rosbags"),
         )
     if not bag.exists():
         raise TraceError(f"no such bag — {bag}", "give the directory of a rosbag2")
@@ -255,7 +256,7 @@ def join_bag(
     internal_sql().keep(con, "bag_joined", given)
     con.execute("DELETE FROM store.bag_message WHERE run_id = $run_id", given)
     con.execute(_STORED, given)
-    table = internal_sql().run(con, "bag_topic", {}).to_arrow_table()
+    table = internal_sql().run(con, "bag_topic", given).to_arrow_table()
     con.execute("DROP TABLE temp.bag_read")
     con.execute("DROP TABLE temp.bag_joined")
     return QueryResult(table, internal_sql().header("bag_topic"), runs, notes)

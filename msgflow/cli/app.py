@@ -24,6 +24,7 @@ from msgflow.cli.output import discard_stdout, print_error
 from msgflow.cli.signals import HANDLER
 from msgflow.errors import ExitCode, UsageError, require_utf8
 from msgflow.sql.interrupt import Terminated
+from msgflow.text.installation import install_command
 from msgflow.version import __version__
 
 COMMANDS = (
@@ -32,6 +33,7 @@ COMMANDS = (
     "ingest",
     "query",
     "why",
+    "predict",
     "flow",
     "graph",
     "ui",
@@ -61,7 +63,6 @@ function. Its function `asked` returns the command of a query if the words behin
 _MORE = frozenset(("bag", "db", "events", "fleet", "mcp", "simulate"))
 """What users of one robot rarely need: it has a panel of its own in the help."""
 _ADDED = "msgflow.commands"
-_SIMULATOR = "in a checkout of msgflow: uv tool install . --with ./simulator"
 
 
 class RootGroup(TyperGroup):
@@ -88,7 +89,10 @@ class RootGroup(TyperGroup):
             from msgflow.query.catalogue import queries_meant
 
             if args[0] == "simulate":
-                raise UsageError("the simulator is not installed", _SIMULATOR)
+                raise UsageError(
+                    "the simulator is not installed",
+                    f"in a checkout of msgflow: {install_command('./simulator')}",
+                )
             if meant := queries_meant(args[0]):
                 hint = " or ".join(header.command for header in meant)
                 raise UsageError(f"there is no such command — {args[0]}", hint)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Unpack
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from msgflow.backports import Unpack
 from msgflow.cli.operation import asks
 from msgflow.cli.options import OUTPUT
 from msgflow.cli.output import Shown, print_error, print_lines, print_note, print_result

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Unpack
+from typing import Annotated
 
 import typer
 
+from msgflow.backports import Unpack
 from msgflow.cli.completion import complete
 from msgflow.cli.operation import operation
 from msgflow.cli.output import Shown, print_result, print_status

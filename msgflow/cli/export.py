@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from msgflow.export.mcap import ExportedMcap
     from msgflow.export.otlp import ExportedTraces
     from msgflow.export.perfetto import PerfettoTrace
+    from msgflow.export.timing_model import TimingModel
     from msgflow.export.view_files import ExportedView
 
 app = typer.Typer()
@@ -63,6 +64,21 @@ def folded(stacks: FoldedStacks, output: Path) -> None:
     print_status(
         f"{count(stacks.stacks, 'stack')} of {count(stacks.samples, 'sample')} written to {output}"
     )
+
+
+@app.command("timing-model")
+@asks(Database.export_timing_model)
+def timing_model(model: TimingModel, output: Path) -> None:
+    """docs/export.md says what the bound is."""
+    print_runs([model.run])
+    print_status(
+        f"{count(model.callbacks, 'callback')}, {count(model.chains, 'chain')} written to {output}"
+    )
+    if model.exceeded:
+        print_note(
+            f"{count(model.exceeded, 'callback')} took longer than the bound: their executors had"
+            " no CPU, or do not decide what is ready when a wait ends"
+        )
 
 
 @app.command("mcap")

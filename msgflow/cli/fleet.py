@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict
 
 import typer
 
+from msgflow.backports import Unpack
 from msgflow.cli.compare import EvenByChance, FailOn, OnlyDifferent, print_comparison
 from msgflow.cli.operation import operation
 from msgflow.cli.options import Reader, bytes_of, one_text

@@ -104,6 +104,7 @@ SHARED: dict[str, Any] = {
     "internal": _selecting("Also show what ROS does for itself (/rosout, /parameter_events, …)"),
     "at": typer.Option(metavar="TIME"),
     "place": typer.Argument(metavar="[TOPIC|NODE]", autocompletion=complete("place")),
+    "changes": typer.Option("--set", metavar="CHANGE"),
     "from_": _place("Topics or nodes where flows start"),
     "to": _place("Topics or nodes where flows end"),
     "via": _place("Flows through all of these topics and nodes"),

@@ -54,6 +54,23 @@ def ingest_progress(
 
 
 @contextmanager
+def replay_progress() -> Iterator[Callable[[int, int, str], None]]:
+    """Yield the function that shows which replay runs; without a terminal it shows nothing."""
+    if sys.stderr is None or not sys.stderr.isatty():
+        yield lambda *_: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    columns = (BarColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("reading the run", total=None)
+        yield lambda number, total, text: bar.update(
+            task, description=f"replay {number} of {total}: {text}", total=total, completed=number
+        )
+
+
+@contextmanager
 def fleet_progress(quiet: bool) -> Iterator[Callable[[FleetProgress], None] | None]:
     """Yield the function that shows how many recordings are done; None with `quiet`.
 

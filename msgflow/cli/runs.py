@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import replace
-from typing import Annotated, Unpack
+from typing import Annotated
 
 import typer
 
+from msgflow.backports import Unpack
 from msgflow.cli.completion import complete
 from msgflow.cli.operation import operation
 from msgflow.cli.options import DefaultGroup

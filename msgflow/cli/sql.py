@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Unpack
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from msgflow.backports import Unpack
 from msgflow.cli.errors import print_exception
 from msgflow.cli.operation import operation
 from msgflow.cli.output import Shown, print_result, print_status

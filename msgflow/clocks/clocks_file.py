@@ -7,12 +7,12 @@ robot-c: -12500
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from msgflow.backports import tomllib
 from msgflow.errors import UsageError
 from msgflow.files.text_file import read_text
 from msgflow.files.yaml_file import YamlFile, line_of

@@ -133,9 +133,10 @@ class ConfinedProcess:
     def _answer(self, seconds: float | None, on_end: tuple[str, str]) -> bytearray:
         end = None if seconds is None else time.monotonic() + seconds
         content = bytearray()
-        while size := int.from_bytes(self._read(_SIZE, end, on_end)):
+        while size := int.from_bytes(self._read(_SIZE, end, on_end), "big"):
             content += self._read(size, end, on_end)
-        said = json.loads(self._read(int.from_bytes(self._read(_SIZE, end, on_end)), end, on_end))
+        size = int.from_bytes(self._read(_SIZE, end, on_end), "big")
+        said = json.loads(self._read(size, end, on_end))
         if said is None:
             return content
         kind = getattr(errors, said["error"], None)
@@ -209,7 +210,7 @@ def _write(answers: int, content: Any) -> int:
     """Write a part of an answer, its size first; return its size."""
     view = memoryview(content).cast("B")
     if size := len(view):
-        for part in (memoryview(size.to_bytes(_SIZE)), view):
+        for part in (memoryview(size.to_bytes(_SIZE, "big")), view):
             rest = part
             while rest:
                 rest = rest[os.write(answers, rest) :]

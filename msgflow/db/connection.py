@@ -9,7 +9,6 @@ those of a new file.
 from __future__ import annotations
 
 import shlex
-import tempfile
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -21,11 +20,22 @@ from msgflow.db.objects import definition_hash, head_revision, known_revisions
 from msgflow.db.sandbox import open_file, opening, remove_abandoned_spills, require_file
 from msgflow.errors import DatabaseError
 from msgflow.files.resources import resource_directory
+from msgflow.files.temporary_owner import temporary_directory
 from msgflow.sql.failure import database_errors
 from msgflow.sql.quoting import literal
 
 # What to do about tables that no revision upgrades, as those of before the first release.
 INGEST_AGAIN = "msgflow ingest TRACE --db NEW.duckdb reads the recording again"
+
+
+_TRIGGERS = """
+UNION ALL
+SELECT
+    'trigger ' || schema_name || '.' || trigger_name,
+    coalesce(sql, '')
+FROM duckdb_triggers()
+WHERE database_name = current_database()
+"""
 
 
 def connect(
@@ -136,9 +146,9 @@ def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:
         )
     if revision not in known_revisions():
         raise DatabaseError(
-            f"database has schema revision {revision[:40]!r}, newer than this msgflow knows "
-            f"({head_revision()}) — {path}",
-            "upgrade msgflow, or ingest the traces into a new file",
+            f"database has schema revision {revision[:40]!r}, which this msgflow does not know "
+            f"(its own is {head_revision()}) — {path}",
+            "upgrade msgflow if another one is newer, or ingest the traces into a new file",
         )
     return revision
 
@@ -146,7 +156,11 @@ def require_known(con: duckdb.DuckDBPyConnection, path: Path) -> str:
 def definitions(con: duckdb.DuckDBPyConnection) -> dict[str, str]:
     """Return the definitions in the current database by kind and name; read none of its tables."""
     text = (resource_directory("schema") / "definitions.sql").read_text(encoding="utf-8")
-    return dict(con.execute(text).fetchall())
+    return dict(con.execute(text + (_TRIGGERS if _has_triggers() else "")).fetchall())
+
+
+def _has_triggers() -> bool:
+    return int(duckdb.__version__.partition(".")[0]) >= 2
 
 
 def require_ours(con: duckdb.DuckDBPyConnection, path: Path) -> None:
@@ -186,8 +200,8 @@ def _require(found: Mapping[str, str], wanted: Mapping[str, str], path: Path) ->
 @cache
 def expected_definitions() -> Mapping[str, str]:
     """Return the definitions that a database of this msgflow has, by kind and name."""
-    with tempfile.TemporaryDirectory(prefix="msgflow-") as directory:
-        path = Path(directory) / "new.duckdb"
+    with temporary_directory("msgflow-definitions-") as directory:
+        path = directory / "new.duckdb"
         write_empty(path)
         with duckdb.connect(str(path), read_only=True) as con:
             return definitions(con)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msgflow.backports import StrEnum
 from msgflow.export.formats import by_suffix
 
 if TYPE_CHECKING:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from enum import StrEnum
 from itertools import repeat
 from operator import add
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, TypeVar
 
+from msgflow.backports import StrEnum
 from msgflow.errors import UsageError
 from msgflow.result.rows import cells
 from msgflow.text.json_value import json_text, json_value
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from msgflow.result.query_result import QueryResult
 
 _ROWS_AT_ONCE = 10_000
+# Patterns of texts, and what replaces them.
+_FORMULAS = ((r"^([=+\-@\t\r])", r"'\1"),)
+_ENDS = (("\n", r"\\n"),)
 _GAP = "  "
 Form = TypeVar("Form")
 
@@ -141,12 +144,22 @@ def _json_array(result: QueryResult) -> Iterator[str]:
 def write_csv(
     schema: pa.Schema, batches: Iterable[pa.RecordBatch], target: Path | IO[bytes], *, is_safe: bool
 ) -> int:
-    """Write batches as CSV, and return how many rows; `is_safe`: without formulas."""
+    """Write batches as CSV, and return how many rows; `is_safe`: without formulas.
+
+    On a terminal a row is one line: ends of lines in names are printed as text.
+    """
     import pyarrow.csv
 
     from msgflow.trace.numpy_arrow import empty_batch
 
-    prepared = _without_formulas if is_safe else _csv_batch
+    is_screen = not isinstance(target, Path) and target.isatty()
+
+    def prepared(batch: pa.RecordBatch) -> pa.RecordBatch:
+        batch = _csv_batch(batch)
+        for pattern, by in (*_FORMULAS * is_safe, *_ENDS * is_screen):
+            batch = _with_texts(batch, pattern, by)
+        return batch
+
     count = 0
     with pyarrow.csv.CSVWriter(target, prepared(empty_batch(schema)).schema) as writer:
         for batch in batches:
@@ -166,16 +179,16 @@ def _csv_batch(batch: pa.RecordBatch) -> pa.RecordBatch:
     return pyarrow.RecordBatch.from_arrays(columns, names=batch.schema.names)
 
 
-def _without_formulas(batch: pa.RecordBatch) -> pa.RecordBatch:
+def _with_texts(batch: pa.RecordBatch, pattern: str, by: str) -> pa.RecordBatch:
+    """Return a batch with what matches a pattern in its texts and names replaced."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
-    def safe(texts: pa.Array) -> pa.Array:
-        return pc.replace_substring_regex(texts, r"^([=+\-@\t\r])", r"'\1")
+    def changed(texts: pa.Array) -> pa.Array:
+        return pc.replace_substring_regex(texts, pattern, by)
 
-    batch = _csv_batch(batch)
-    columns = [safe(each) if pa.types.is_string(each.type) else each for each in batch.columns]
-    names = safe(pa.array(batch.schema.names, pa.string())).to_pylist()
+    columns = [changed(each) if pa.types.is_string(each.type) else each for each in batch.columns]
+    names = changed(pa.array(batch.schema.names, pa.string())).to_pylist()
     return pa.RecordBatch.from_arrays(columns, names=names)
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msgflow.backports import StrEnum
 from msgflow.export.formats import SUFFIXES, Format, by_suffix
 from msgflow.query.catalogue import load_query
 from msgflow.query.runner import run_query

@@ -15,6 +15,7 @@ from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
 from msgflow.sql.failure import format_errors
 from msgflow.sql.statement import internal_sql
+from msgflow.text.installation import install_command
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def write_mcap(
     except ImportError:
         raise UsageError(
             "the package that writes MCAP files is not installed — mcap-ros2-support",
-            "pip install mcap-ros2-support; or in a checkout of msgflow: uv tool install '.[mcap]'",
+            install_command("mcap-ros2-support"),
         ) from None
     topics: set[str] = set()
     values = losses = 0

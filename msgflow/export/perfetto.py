@@ -17,6 +17,7 @@ from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
 from msgflow.sql.failure import format_errors
 from msgflow.sql.statement import internal_sql
+from msgflow.text.installation import install_command
 
 if TYPE_CHECKING:
     import duckdb
@@ -66,7 +67,7 @@ def write_perfetto(connection: duckdb.DuckDBPyConnection, path: Path, part: Slic
     except ImportError:
         raise UsageError(
             "the package that writes Perfetto traces is not installed — perfetto",
-            "pip install perfetto; or in a checkout of msgflow: uv tool install '.[perfetto]'",
+            install_command("perfetto"),
         ) from None
     with format_errors(run.name), replacing(path) as temporary, temporary.open("wb") as file:
         builder = StreamingTraceProtoBuilder(file)

@@ -116,7 +116,7 @@ def select_views(
     columns = {view: names for view, names in found if view in declared}
     for view in views:
         if view not in columns:
-            hint = did_you_mean(view, list(columns), "msgflow db schema")
+            hint = did_you_mean(view, list(columns), f"msgflow db schema; a directory: -o {view}")
             raise UsageError(f"there is no such view — {view}", hint)
     runs = part.runs(connection)
     if not runs:

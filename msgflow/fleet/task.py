@@ -18,10 +18,10 @@ import sys
 import tempfile
 import time
 from dataclasses import asdict, dataclass, field, replace
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
+from msgflow.backports import StrEnum
 from msgflow.files.temporary_owner import temporary_directory
 
 # Variables with secrets, which messages of libraries could repeat.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import os
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ from typing import Any
 from msgflow.errors import UsageError
 from msgflow.fleet.task import Outcome, Reason, Task, run_task
 from msgflow.sql.failure import first_line
+from msgflow.text.installation import install_command
 
 LOCAL = "local"
 _SCRATCH = "scratch"
@@ -61,7 +61,7 @@ class RayWorkers:
             import ray
         except ImportError as error:
             raise UsageError(
-                "Ray is not installed", "pip install 'ros2-msgflow[fleet]', or leave out --ray"
+                "Ray is not installed", f"{install_command('ray')}; or leave out --ray"
             ) from error
         self._ray: Any = ray
         self._is_ours = not ray.is_initialized()
@@ -71,21 +71,24 @@ class RayWorkers:
             more: dict[str, Any] = {"address": address}
             if address == LOCAL:
                 more |= {"include_dashboard": False, "object_store_memory": 100_000_000}
+            here = os.getcwd()
+            # Ray's workers import from this folder first. In a foreign one, a file could have the
+            # name of a module.
+            os.chdir(_FOLDER_WITHOUT_MODULES)
             try:
-                # Ray's workers import from this folder first. In a foreign one, a file could have
-                # the name of a module.
-                with contextlib.chdir(_FOLDER_WITHOUT_MODULES):
-                    ray.init(
-                        logging_level=logging.ERROR,
-                        log_to_driver=False,
-                        configure_logging=False,
-                        **more,
-                    )
+                ray.init(
+                    logging_level=logging.ERROR,
+                    log_to_driver=False,
+                    configure_logging=False,
+                    **more,
+                )
             except Exception as error:
                 raise UsageError(
                     f"cannot reach the Ray cluster: {first_line(error)} — {address}",
                     "ray status --address ADDRESS; --ray local starts one of this machine",
                 ) from error
+            finally:
+                os.chdir(here)
         # `ingest` counts the tries of a task whose worker was lost.
         self._run = ray.remote(max_retries=0)(run_task)
         self._running: dict[Any, Task] = {}

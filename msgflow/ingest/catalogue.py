@@ -5,7 +5,6 @@ The data is in `tracepoints.toml`; this gives it Arrow and SQL form.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -13,6 +12,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import pyarrow as pa
+
+from msgflow.backports import tomllib
 
 COMMON_COLUMNS = (
     ("event_id", "BIGINT"),

@@ -27,6 +27,7 @@ from msgflow.errors import MsgflowError, QueryError, UsageError
 from msgflow.export.flow import tree_text
 from msgflow.export.formats import json_rows
 from msgflow.query.catalogue import load_queries, load_query, query_names
+from msgflow.text.installation import install_command
 from msgflow.version import __version__
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
     from msgflow.query.story import Story
     from msgflow.query.why import Explanation
+    from msgflow.replay.remedies import Remedies
     from msgflow.result.query_result import QueryResult
     from msgflow.sql.header import Header
 
@@ -58,7 +60,7 @@ def make_server(path: Path, *, seconds: float = MOST_SECONDS) -> MCPServer[Any]:
     except ImportError:
         raise UsageError(
             "the SDK of the Model Context Protocol is not installed",
-            "in a checkout of msgflow: pip install '.[mcp]', or uv tool install '.[mcp]'",
+            install_command("mcp"),
         ) from None
 
     class StrictServer(MCPServer[Any]):
@@ -239,16 +241,24 @@ class _Tools:
         start: str | None = None,
         end: str | None = None,
         goal: str | None = None,
+        fix: bool = False,
     ) -> str:
         """Explain why a topic is late: the culprits, the paths, and where their time goes.
 
         Section verdict has the culprits, the worst first: headline, evidence, and in next what to
         ask then, as words of the command line. place: topic or node where the flows end; by
         default all ends. run, start, end: as for run_query. goal: in place of that, what became of
-        a goal of an action, and what took longest: goal_id of the view goal.
+        a goal of an action, and what took longest: goal_id of the view goal. fix: in place of that,
+        what may make data sooner, tried in replays of the run: section remedies, the best first.
         """
-        found: Explanation | Story = (
-            self._database.why(place, run=run, start=start, end=end)
+        asked = {"place": place, "start": start, "end": end, "fix": fix}
+        if goal is not None and any(asked.values()):
+            names = ", ".join(name for name, value in asked.items() if value)
+            raise UsageError(f"a goal has a place and times of its own — {names}", "leave it out")
+        found: Explanation | Story | Remedies = (
+            self._database.remedies(place, run=run, start=start, end=end)
+            if fix
+            else self._database.why(place, run=run, start=start, end=end)
             if goal is None
             else self._database.story(goal, run=run)
         )
@@ -257,7 +267,17 @@ class _Tools:
             for name, result in found.sections.items()
             for row in json_rows(result)
         )
-        return _answer([found.run.title], rows, found.notes)
+        notes = [*found.notes, *filter(None, [getattr(found, "suggestion", None)])]
+        return _answer([found.run.title], rows, notes)
+
+    def predict(self, changes: list[str], place: str | None = None, run: str | None = None) -> str:
+        """Replay a run with changes: what they do to the latency of each path.
+
+        changes: such as 'threads(/perception)=2', 'executor(/camera)=1' (one of its own),
+        'duration(/detector on_image)*0.7', 'period(/controller)=20ms', 'depth(/scan)=1'; why with
+        fix tries what may help. place: topic or node where the paths end. run: as for run_query.
+        """
+        return _rows(self._database.predict(place, changes=changes, run=run), MOST_ROWS)
 
     def compare(
         self,

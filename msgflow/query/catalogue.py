@@ -5,7 +5,6 @@ A query may have variants, each in a file of its own: an option chooses one.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -13,6 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from msgflow.backports import tomllib
 from msgflow.errors import UsageError
 from msgflow.files.resources import resource_directory
 from msgflow.sql.header import Header, read

@@ -6,10 +6,11 @@ import contextlib
 import re
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import duckdb
 
+from msgflow.backports import Self
 from msgflow.errors import UsageError
 from msgflow.query.names import PLACE_PARAMETERS, require_ids, require_names, require_places
 from msgflow.query.notes import empty_notes, outside, row_notes

@@ -87,12 +87,7 @@ def read_story(connection: duckdb.DuckDBPyConnection, request_id: int) -> Story:
     total_ns = sum(row["took_ns"] for row in stages)
     last = (stages or rows[:1])[-1]
     worst = max(stages, key=lambda row: row["took_ns"], default=rows[0])
-    asked = (
-        row
-        for row in rows
-        if row["request_id"] and (row["what"] or "").startswith(str(worst["what"]))
-    )
-    words = header.next_command(next(asked, worst))
+    words = header.next_command(worst)
     is_sent = rows[0]["step"] == "sent"
     at_s = (rows[0]["at_ns"] - (run.start_ns or 0)) / 1e9
     verdict = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta, timezone
 from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 MINIMUM_NS = -(2**63)
 MAXIMUM_NS = 2**63 - 1
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
 # Smaller numbers are seconds: as nanoseconds since the epoch they would lie in the first 12 days of
 # 1970. As seconds, this number would be 30 million years.
 LEAST_EPOCH_NS = 10**15
@@ -161,9 +161,10 @@ def _iso_ns(text: str) -> int:
     if match := _FRACTION.fullmatch(text):
         nanoseconds = int(match["fraction"].ljust(9, "0"))
         text = match["head"] + match["tail"]
-    moment = datetime.fromisoformat(text)
+    # Python reads the Z since 3.11.
+    moment = datetime.fromisoformat(re.sub(r"Z$", "+00:00", text))
     if moment.tzinfo is None:
-        moment = moment.replace(tzinfo=UTC)
+        moment = moment.replace(tzinfo=timezone.utc)
     return (moment - _EPOCH) // timedelta(seconds=1) * 1_000_000_000 + nanoseconds
 
 

@@ -57,5 +57,5 @@ def _load_from_distribution() -> Any:
     raise TraceError(
         f"Babeltrace 2's Python bindings are installed for Python {version}, msgflow runs in "
         f"Python 3.{sys.version_info.minor} — {found[0]}",
-        hint=f"if that is 3.11 or newer: uv tool install --python /usr/bin/python{version} msgflow",
+        hint=f"if that is 3.10 or newer, install msgflow for it: /usr/bin/python{version}",
     )

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from enum import StrEnum
 
+from msgflow.backports import StrEnum
 from msgflow.text.name_suggestions import meant_or, nearest
 from msgflow.text.values import format_duration
 

@@ -5,11 +5,11 @@ The data is in `metrics.toml`, whose top says what the fields mean.
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from msgflow.backports import tomllib
 from msgflow.verify.condition import Dimension
 
 # Kinds that are not like others: a path, and the way between two topics or nodes.

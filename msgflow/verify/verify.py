@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from fnmatch import fnmatchcase
 from functools import cache
 from operator import eq
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pyarrow as pa
 
+from msgflow.backports import StrEnum
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import load_query
 from msgflow.query.notes import AMBIGUOUS

@@ -13,12 +13,13 @@ import duckdb
 import pyarrow as pa
 
 from msgflow.db.finding import read_findings
-from msgflow.errors import UsageError
+from msgflow.errors import NoFlowError, UsageError
 from msgflow.query.catalogue import load_query
 from msgflow.query.compare import compare, warm_up
-from msgflow.query.course import read_course
+from msgflow.query.course import Course, read_course
 from msgflow.query.notes import clock_notes
 from msgflow.query.runner import Steps, bind, run_query
+from msgflow.query.why import explain
 from msgflow.result.query_result import QueryResult
 from msgflow.run.slice import Slice
 from msgflow.run.window import WHOLE, Window
@@ -30,6 +31,7 @@ from msgflow.view import summary
 from msgflow.view.page_query import Params, Question, Scratch, page_query, run_page_query
 from msgflow.view.sql_page import examples, words
 from msgflow.view.table_encoding import encode, encode_result, escaped
+from msgflow.view.what_if import WhatIf
 
 # Named queries that pages show, with the numbers of `msgflow query`.
 NAMED = (
@@ -64,6 +66,10 @@ class Pages:
         self._window = window
         self._kept: OrderedDict[str, bytes] = OrderedDict()
         self._guard = threading.Lock()
+        self.what_if = WhatIf()
+        # What changed last, and in which times that was looked for: parts of a page ask together.
+        self._course_guard = threading.Lock()
+        self._course: tuple[Slice, Course] | None = None
 
     def close(self) -> None:
         """Free what is kept."""
@@ -100,11 +106,25 @@ class Pages:
         if name not in SUMMARY:
             raise UsageError(f"the summary has no such section — {name}")
         if name == "why":
-            return summary.why_section(asked)
+            try:
+                found = explain(asked.connection, asked.run, asked.slice)
+            except NoFlowError:
+                return summary.why_section(asked, None)
+            with self._course_guard:
+                self._course = asked.slice, found.course
+            return summary.why_section(asked, found)
         if name != "blame":
             return summary.query_section(asked, name, through)
         paths = [row["path_id"] for row in asked.paths.to_pylist() if through in row["path"]]
         return summary.blame_section(asked, self.slowest_takes(asked, paths)[: summary.MOST_PATHS])
+
+    def course(self, asked: Question) -> Course:
+        """Return what changed, which an explanation of the same times has found, too."""
+        with self._course_guard:
+            if self._course is None or self._course[0] != asked.slice:
+                course = read_course(asked.connection, asked.run, asked.slice)
+                self._course = asked.slice, course
+            return self._course[1]
 
     def slowest_flows(self, asked: Question) -> list[dict[str, Any]]:
         """Return the slowest flow of each path that began in the window, the slowest first."""
@@ -219,7 +239,7 @@ def _stack(_: Pages, asked: Question) -> bytes:
         if number not in paths:
             raise UsageError(f"the run has no such path — {number}")
         parts = _stacks_of_path(asked, paths[number], slowest)
-        number = sorted(set(paths.values())).index(paths[number]) + 1
+        number = sorted(paths.values()).index(paths[number]) + 1
         words = ["query", "functions", "--path", str(number), "--slowest", str(slowest)]
     shown = [part.slice(0, MOST_STACKS) for part in parts]
     table = pa.concat_tables(
@@ -301,8 +321,8 @@ def critical_path(asked: Question) -> bytes:
     return encode_result(shown, meta, asked.origin_ns)
 
 
-def _course(_: Pages, asked: Question) -> bytes:
-    course = read_course(asked.connection, asked.run, asked.slice)
+def _course(pages: Pages, asked: Question) -> bytes:
+    course = pages.course(asked)
     meta = {
         "lines": escaped(course.lines.to_pylist()),
         "sentences": escaped(course.sentences.select(_OF_SENTENCES).to_pylist()),
@@ -342,6 +362,9 @@ ANSWERS: dict[str, Callable[[Pages, Question], bytes]] = {
     "links": _links,
     "flow": _flow,
     "warm_up": _warm_up,
+    "remedy": lambda pages, asked: pages.what_if.remedies(asked),
+    "what_if": lambda pages, asked: pages.what_if.paths(asked),
+    "what_if_part": lambda pages, asked: pages.what_if.parts(asked),
 }
 """The answers that are no plain page query, by name."""
 

@@ -21,7 +21,6 @@ from msgflow.errors import UsageError
 from msgflow.files.atomic import replacing
 from msgflow.query.compare import Comparison
 from msgflow.query.compare import compare as compare_runs
-from msgflow.query.course import read_course
 from msgflow.result.query_result import QueryResult
 from msgflow.run.choice import Run
 from msgflow.run.slice import Slice
@@ -153,7 +152,7 @@ class _Maker:
             self.parts[f"query?name={name}"] = content
         for name in (
             "row", "gap", "path", "executor_node", "executor_share", "callback", "loss",
-            "loss_point", "thread_name", "program_share", "mark", "counter", "course",
+            "loss_point", "thread_name", "program_share", "mark", "counter",
         ):  # fmt: skip
             self.keep(name)
         self.keep("counter", rates=1)
@@ -162,6 +161,7 @@ class _Maker:
         if self.other is not None and self.comparison is not None:
             self.keep_comparison(self.other, self.comparison, chosen)
         sections = self.sections()
+        self.keep("course")
         for section in sections:
             content = encoded_section(section, self.asked.origin_ns)
             self.parts[f"summary?part={section.name}"] = content
@@ -184,9 +184,9 @@ class _Maker:
             f"msgflow {row['msgflow_version']}",
         ]
         findings = read_findings(self.asked.connection, [run.run_id])
-        course = read_course(self.asked.connection, run, self.asked.slice)
-        picture = list(course.picture())
-        return markdown(run, facts, self.notes, picture, findings, self.sections())
+        sections = self.sections()
+        picture = list(self.pages.course(self.asked).picture())
+        return markdown(run, facts, self.notes, picture, findings, sections)
 
     def look_at_window(self) -> None:
         """Raise if nothing is in the window; note that it is not the whole run."""

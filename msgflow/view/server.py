@@ -162,6 +162,7 @@ async def _answered(
     """Return the answer; interrupt the question when the browser no longer waits for it."""
     interrupts: list[Callable[[], None]] = []
     content: list[bytes] = []
+    failures: list[Exception] = []
 
     async def watch() -> None:
         while not await request.is_disconnected():
@@ -176,18 +177,21 @@ async def _answered(
     try:
         async with anyio.create_task_group() as group:
             group.start_soon(watch)
-            content.append(
-                await anyio.to_thread.run_sync(lambda: ask(interrupts.append), limiter=limiter)
-            )
+            # What the query raises would leave the group as a group of one.
+            try:
+                content.append(
+                    await anyio.to_thread.run_sync(lambda: ask(interrupts.append), limiter=limiter)
+                )
+            except Exception as error:
+                failures.append(error)
             group.cancel_scope.cancel()
-    except BaseExceptionGroup as errors:
-        # A group of one: what the query raised.
-        raise errors.exceptions[0] from None
     except anyio.get_cancelled_exc_class():
         # The server ends, and does not wait for the question.
         for interrupt in interrupts:
             interrupt()
         return PlainTextResponse("error: the server has ended\n", status_code=503)
+    if failures:
+        raise failures[0]
     return Response(content[0], media_type="application/octet-stream")
 
 

@@ -15,13 +15,13 @@ from typing import NamedTuple
 import pyarrow as pa
 
 from msgflow.db.finding import Finding
-from msgflow.errors import NoFlowError, UsageError
+from msgflow.errors import UsageError
 from msgflow.files.default_files import DEFAULT_PATHS
 from msgflow.query.catalogue import load_query
 from msgflow.query.compare import Comparison
 from msgflow.query.runner import run_query
 from msgflow.query.selection import Selection
-from msgflow.query.why import MOST_CULPRITS, explain
+from msgflow.query.why import MOST_CULPRITS, Explanation
 from msgflow.result.query_result import QueryResult
 from msgflow.result.rows import cells
 from msgflow.run.choice import Run
@@ -116,14 +116,12 @@ def query_section(asked: Question, name: str, through: str = "") -> Section:
     return _chosen(asked, name, query, selection)
 
 
-def why_section(asked: Question) -> Section:
+def why_section(asked: Question, found: Explanation | None) -> Section:
     """Return the culprits of `msgflow why`, the worst first; its notes are what is in doubt.
 
     `next` of each is a whole command.
     """
-    try:
-        found = explain(asked.connection, asked.run, asked.slice)
-    except NoFlowError:
+    if found is None:
         return Section("why", QueryResult(pa.table({"headline": pa.array([], pa.string())})), ())
     table = found.verdict.table
     commands = [text and _command(asked, shlex.split(text)) for text in table["next"].to_pylist()]

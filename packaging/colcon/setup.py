@@ -4,10 +4,15 @@ colcon cannot read a pyproject.toml that names the Python it requires: this dire
 """
 
 import os
-import tomllib
+import sys
 from pathlib import Path
 
 from setuptools import setup
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 ROOT = Path("../..")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))

@@ -12,6 +12,7 @@ from typing import Any
 
 import duckdb
 import pytest
+from support.robots import robot
 from support.thorough import few
 
 from msgflow.errors import TraceError
@@ -19,7 +20,6 @@ from msgflow.trace import bt2_library
 from msgflow_sim import (
     Host,
     Node,
-    Process,
     Publisher,
     Scenario,
     Simulation,
@@ -186,14 +186,11 @@ def quiet() -> Scenario:
         timers=(Timer(10 * 1_000_000_000, publishes=("/seldom",)),),
     )
     listener = Node("listener", subscriptions=(Subscription("/seldom"),))
-    return Scenario(
+    return robot(
+        talker,
+        listener,
         name="quiet",
-        description="Hardly anything happens.",
-        hosts=(Host("alpha", cpu_count=1),),
-        processes=(
-            Process("talker", "alpha", 100, (talker,)),
-            Process("listener", "alpha", 200, (listener,)),
-        ),
+        hosts=(Host("robot", cpu_count=1),),
         duration_ns=35 * 1_000_000_000,
     )
 
@@ -210,17 +207,7 @@ def overloaded() -> Scenario:
         "listener",
         subscriptions=(Subscription("/fast", work=Work(4_000_000), depth=3),),
     )
-    return Scenario(
-        name="overloaded",
-        description="More messages than anybody can take.",
-        hosts=(Host("alpha"),),
-        processes=(
-            Process("talker", "alpha", 100, (talker,)),
-            Process("listener", "alpha", 200, (listener,)),
-        ),
-        duration_ns=1_000_000_000,
-        overwrites=True,
-    )
+    return robot(talker, listener, name="overloaded", duration_ns=1_000_000_000, overwrites=True)
 
 
 @pytest.fixture
@@ -233,13 +220,4 @@ def burst() -> Scenario:
         timers=(Timer(5_000_000, publishes=(topic,) * 5),),
     )
     listener = Node("listener", subscriptions=(Subscription(topic),))
-    return Scenario(
-        name="burst",
-        description="Many messages at once.",
-        hosts=(Host("alpha"),),
-        processes=(
-            Process("talker", "alpha", 100, (talker,)),
-            Process("listener", "alpha", 200, (listener,)),
-        ),
-        duration_ns=1_000_000_000,
-    )
+    return robot(talker, listener, name="burst", duration_ns=1_000_000_000)

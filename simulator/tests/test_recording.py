@@ -83,7 +83,7 @@ def _events(bt2, simulation):
         if kind == "_EventMessageConst":
             context = message.event.common_context_field
             key = (int(context["vpid"]), int(context["vtid"]), message.event.name)
-            events[*key, message.default_clock_snapshot.ns_from_origin] += 1
+            events[(*key, message.default_clock_snapshot.ns_from_origin)] += 1
         elif kind == "_DiscardedEventsMessageConst":
             discarded += message.count or 0
         elif kind == "_DiscardedPacketsMessageConst":

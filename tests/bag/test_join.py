@@ -107,6 +107,7 @@ def test_messages_find_their_publications(database: Path, tmp_path: Path, plugin
     received = [(one, topic, at + jitter.randrange(50_000)) for one, topic, at in sent]
     found = join(database, write_bag(tmp_path / "bag", received, plugin=plugin))
     assert sum(row["joined"] for row in found.values()) == len(sent)
+    assert sum(row["published"] for row in found.values()) == len(sent)
     rows = stored(database)
     assert [row["publication_id"] for row in rows] == sorted(one for one, _, _ in sent)
     assert all(row["stamp_ns"] == row["publication_id"] for row in rows)

@@ -129,6 +129,6 @@ def test_a_simulator_that_is_missing_is_named(
     assert result.exit_code == 2
     assert result.stderr == (
         "error: the simulator is not installed\n\n"
-        "hint: in a checkout of msgflow: uv tool install . --with ./simulator\n"
+        f"hint: in a checkout of msgflow: {sys.executable} -m pip install ./simulator\n"
     )
     assert "simulate" not in msgflow("--help").stdout

@@ -216,6 +216,10 @@ def test_db_schema_lists_the_views_or_the_columns_of_one(
     assert unknown.exit_code == 2
     assert "there is no such view — takes" in unknown.stderr
     assert "did you mean take" in unknown.stderr
+    # A directory is where a view stands.
+    exported = msgflow("export", "parquet", "./out", "--db", small_database)
+    assert exported.exit_code == 2
+    assert "hint: msgflow db schema; a directory: -o ./out" in exported.stderr
 
 
 @pytest.mark.thorough

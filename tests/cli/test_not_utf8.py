@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -45,7 +44,8 @@ def test_a_trace_below_such_a_folder_and_a_database_in_one(
     (place / "old.duckdb").touch()
     code, text = said("ingest", tmp_path, "--db", tmp_path / "new.duckdb")
     assert (code, "not UTF-8 — " in text) == (3, True)
-    with chdir(place):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(place)
         for words, expected in (
             (("ingest", trace, "--db", "new.duckdb"), 4),
             (("query", "e2e-latency", "--db", "old.duckdb"), 4),

@@ -6,12 +6,13 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Unpack
+from typing import Annotated, Any
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
+from msgflow.backports import Unpack
 from msgflow.cli.help import lay_out_help
 from msgflow.cli.operation import asks, extends, operation
 from msgflow.database import Database

@@ -6,11 +6,12 @@ import importlib.metadata
 import os
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
 from support.thorough import few
+
+from msgflow.backports import tomllib
 
 PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
 COMMAND = """
@@ -27,6 +28,7 @@ class CommandExtension:
 # Commands are first parsed without their arguments, to find which is wanted.
 CLI = """
 import argparse, importlib, signal, sys
+
 
 def main(value, argv):
     parser = argparse.ArgumentParser(prog="ros2")

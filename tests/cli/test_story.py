@@ -11,6 +11,7 @@ from rich.cells import cell_len
 from typer.testing import Result
 
 from msgflow import Database
+from msgflow.errors import UsageError
 from msgflow.mcp.server import _Tools
 
 Msgflow = Callable[..., Result]
@@ -31,6 +32,8 @@ def test_a_story_has_the_times_of_the_goal(actions: Path, msgflow: Msgflow) -> N
         ).table.to_pylist()
         story = database.story(goal["goal_id"])
         answer = _Tools(database).why(goal=str(goal["goal_id"]))
+        with pytest.raises(UsageError, match="a place and times of its own — place, end"):
+            _Tools(database).why("/x", end="1s", goal=str(goal["goal_id"]))
     steps = {row["step"]: row for row in story.steps.table.to_pylist()}
     assert steps["accepted"]["at_ns"] == goal["answered_ns"]
     assert steps["first feedback"]["at_ns"] == goal["first_feedback_ns"]
@@ -67,6 +70,7 @@ def test_digits_that_several_goals_begin_with_are_refused(actions: Path, msgflow
         (["flow", "--goal", "/dock"], "there is no such goal — /dock", "(/dock at "),
         (["why", "--goal", goals[0], "--request", 1], "one goal or one request", "--goal ID"),
         (["why", "/x", "--goal", goals[0]], "a goal has a place and times of its own", "leave it"),
+        (["flow", "--goal", goals[0], "--request", 1], "a flow starts from one thing", "give one"),
         (["flow", "--goal", goals[0], "--why"], "--why is about a message", "msgflow why --goal"),
     ):
         result = msgflow(*words, "--db", actions)

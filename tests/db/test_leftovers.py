@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import msgflow
-from msgflow.db.connection import connect
+from msgflow.db.connection import connect, expected_definitions
 from msgflow.db.sandbox import spill_directory
 from msgflow.db.workspace import creating, workspace
 from msgflow.errors import DatabaseError
@@ -27,6 +27,16 @@ def dead_mark() -> str:
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
     return done.stdout.strip()
+
+
+def test_definitions_that_a_killed_command_read_go_with_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    (tmp_path / f"msgflow-definitions-{dead_mark()}.abc").mkdir()
+    expected_definitions.cache_clear()
+    assert expected_definitions()
+    assert not list(tmp_path.glob("msgflow-definitions-*"))
 
 
 def test_a_mark_is_abandoned_with_its_process() -> None:

@@ -15,6 +15,10 @@ from msgflow.db.connection import connect
 from msgflow.db.sql_guard import guarded_query
 from msgflow.errors import DatabaseError, MsgflowError, QueryError, UsageError
 
+newest = pytest.mark.skipif(
+    duckdb.__version__ < "2", reason="attacks with statements of DuckDB 2; DuckDB 1.5 aborts"
+)
+
 
 @pytest.fixture
 def place(small_database: Path) -> Path:
@@ -45,6 +49,7 @@ def places(database: Path) -> list[Path]:
     return [*content(database.parent), *new, database.parent / f"{database.name}.tmp" / "new"]
 
 
+@newest
 def test_every_type_of_statement_is_in_the_attack() -> None:
     assert set(STATEMENTS) == set(duckdb.StatementType.__members__)
     with duckdb.connect() as con:
@@ -54,6 +59,7 @@ def test_every_type_of_statement_is_in_the_attack() -> None:
                 assert [one.type.name for one in found] in ([kind], ["CREATE"]), statement
 
 
+@newest
 def test_no_statement_reads_or_changes_another_file(place: Path) -> None:
     before = content(place.parent)
     with msgflow.open_db(place) as database:
@@ -69,6 +75,7 @@ def test_no_statement_reads_or_changes_another_file(place: Path) -> None:
     assert content(place.parent) == before
 
 
+@newest
 def test_a_with_may_write_though_it_is_a_select() -> None:
     """The reason why a query runs as a subquery: the connection of a lake can be written to."""
     with duckdb.connect() as con:
@@ -82,6 +89,7 @@ def test_a_with_may_write_though_it_is_a_select() -> None:
         assert con.execute("FROM kept").fetchall() == []
 
 
+@newest
 @pytest.mark.thorough
 def test_no_function_reads_or_changes_another_file(place: Path) -> None:
     before = content(place.parent)
@@ -182,7 +190,7 @@ def test_a_forged_view_that_reads_a_file_is_said(place: Path) -> None:
         "SELECT table_name FROM information_schema.tables",
         "EXPLAIN ANALYZE FROM run",
         "EXPLAIN (FORMAT json) FROM run",
-        "EXPLAIN ANALYZE (FORMAT json) (SELECT 1)",
+        pytest.param("EXPLAIN ANALYZE (FORMAT json) (SELECT 1)", marks=newest),
         "EXPLAIN (SELECT 1) UNION SELECT 2",
         "EXPLAIN ANALYZE(SELECT 1)",
         "/* ümläut */ EXPLAIN -- ;\n SELECT 'ö;' -- the end;",
@@ -209,6 +217,7 @@ def test_a_query_keeps_its_order_and_its_plan(small_database: Path) -> None:
         assert database.sql(f"EXPLAIN {query}").to_arrow()["explain_value"][0].as_py() == plan
 
 
+@newest
 def test_what_is_refused_is_said(small_database: Path) -> None:
     with msgflow.open_db(small_database) as database:
         for statement, message in (

@@ -6,11 +6,12 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
+
+from msgflow.backports import tomllib
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "Dockerfile").read_text("utf-8")
@@ -73,4 +74,5 @@ def test_what_is_locked_is_what_the_project_needs() -> None:
         locked = dict(re.findall(r"^([a-z0-9.-]+)==(\S+)", text, re.MULTILINE))
         wanted = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))[table]
         for need in map(Requirement, wanted.get("dependencies", wanted.get("requires"))):
-            assert need.specifier.contains(locked[canonicalize_name(need.name)]), need
+            if need.marker is None or need.marker.evaluate({"python_version": "3.12"}):
+                assert need.specifier.contains(locked[canonicalize_name(need.name)]), need

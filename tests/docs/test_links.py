@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from pathlib import Path
 
 import pytest
+
+from msgflow.backports import tomllib
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-import tomllib
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 from ruamel.yaml import YAML
 
+from msgflow.backports import tomllib
 from msgflow.version import __version__
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,13 +23,14 @@ def test_one_version_everywhere() -> None:
     assert f"ros2-msgflow=={__version__}" in simulator["dependencies"]
 
 
-def test_workflows_start_with_the_oldest_python() -> None:
+def test_workflows_have_the_oldest_python_and_duckdb() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     tests = YAML(typ="safe").load(ROOT / ".github" / "workflows" / "tests.yml")["jobs"]["tests"]
     matrix = tests["strategy"]["matrix"]
-    assert f">={matrix['python'][0]}" == project["requires-python"]
     (oldest,) = (row for row in matrix["include"] if row["duckdb"] == "oldest")
-    assert oldest["python"] == matrix["python"][0]
+    assert f">={oldest['python']}" == project["requires-python"]
+    # The newest DuckDB has no wheel for it.
+    assert matrix["python"][0] == "3.11"
 
 
 def test_the_oldest_duckdb_is_found() -> None:

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from rich.cells import cell_len
 
-from msgflow.export.formats import Format, format_of, write_result
+from msgflow.export.formats import Format, format_of, write_csv, write_result
 from msgflow.result.query_result import QueryResult
 from msgflow.sql.header import parse
 
@@ -167,3 +167,20 @@ def test_cells_stand_below_any_title(title: str, shown: str) -> None:
 )
 def test_the_suffix_chooses_the_format(name: str | None, form: Format) -> None:
     assert format_of(None if name is None else Path(name)) is form
+
+
+class Screen(io.BytesIO):
+    """A terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.mark.parametrize("is_safe", [False, True])
+def test_a_row_of_csv_is_one_line_of_a_terminal(is_safe: bool) -> None:
+    table = pa.table({"na\nme": ["/a\nmsgflow sql"]})
+    file, screen = io.BytesIO(), Screen()
+    for stream in (file, screen):
+        write_csv(table.schema, table.to_batches(), stream, is_safe=is_safe)
+    assert file.getvalue() == b'"na\nme"\n"/a\nmsgflow sql"\n'
+    assert screen.getvalue() == b'"na\\nme"\n"/a\\nmsgflow sql"\n'

@@ -17,6 +17,7 @@ from support.thorough import few
 
 from msgflow import Database, DatabaseError, UsageError
 from msgflow.database import open_db
+from msgflow.text.installation import install_command
 
 SYSTEMS = ("demo", "services", "nested", "partial_sync", "multi_threaded")
 IDENTITIES = (
@@ -227,7 +228,7 @@ def test_every_link_is_an_arrow(exported: Exported) -> None:
     connection, decoded = exported
     found: Counter[tuple[Any, ...]] = Counter()
     for begin, end in decoded.arrows:
-        found[*identity(decoded.slices[begin]), *identity(decoded.slices[end])] += 1
+        found[(*identity(decoded.slices[begin]), *identity(decoded.slices[end]))] += 1
     expected = Counter(
         connection.execute(
             "SELECT from_kind, from_id, to_kind, to_id FROM flow_edge"
@@ -392,9 +393,7 @@ def test_without_the_package_it_is_said(
     monkeypatch.setitem(sys.modules, "perfetto", None)
     with Database(small_database) as database, pytest.raises(UsageError, match="perfetto") as error:
         database.export_perfetto(tmp_path / "a.pftrace")
-    assert error.value.hint == (
-        "pip install perfetto; or in a checkout of msgflow: uv tool install '.[perfetto]'"
-    )
+    assert error.value.hint == install_command("perfetto")
     assert not (tmp_path / "a.pftrace").exists()
 
 

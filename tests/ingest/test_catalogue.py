@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from pathlib import Path
 from typing import Any, get_args
 
@@ -12,6 +11,7 @@ import pyarrow as pa
 import pytest
 
 import msgflow.trace
+from msgflow.backports import tomllib
 from msgflow.files.resources import resource_directory
 from msgflow.ingest import catalogue, staging
 from msgflow.ingest.cpus import Cpus

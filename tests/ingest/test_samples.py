@@ -139,7 +139,7 @@ def test_the_text_of_plain_perf_script_is_not_joined(session: Path, new_database
     by_count = {one.count: one.detail for one in findings if one.name == "samples_not_joined"}
     assert by_count.keys() == {1, 4}
     assert "none of 1 samples of functions is of a clock" in by_count[1]
-    assert "4 samples of functions lack the id of their process" in by_count[4]
+    assert "4 samples or lines lack the id of their process" in by_count[4]
     assert "perf script --header --ns -F pid,tid,cpu,time," in by_count[4]
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from support.weigh import WEIGHTS
+
+from msgflow.backports import tomllib
 
 FILE = Path(__file__).with_name("weights.toml")
 

@@ -47,9 +47,9 @@ def test_not_installed(no_bt2: Path) -> None:
 @pytest.mark.parametrize(
     ("tag", "version", "hint"),
     [
-        ("399", r"3\.99", "uv tool install --python /usr/bin/python3.99 msgflow"),
-        ("310", r"3\.10", "if that is 3.11 or newer"),
-        ("36m", r"3\.6", "if that is 3.11 or newer"),
+        ("399", r"3\.99", "install msgflow for it: /usr/bin/python3.99"),
+        ("310", r"3\.10", "if that is 3.10 or newer"),
+        ("36m", r"3\.6", "if that is 3.10 or newer"),
     ],
 )
 def test_installed_for_another_python(no_bt2: Path, tag: str, version: str, hint: str) -> None:

@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pyarrow as pa
 import pytest
@@ -18,6 +19,7 @@ from typer.testing import CliRunner
 from msgflow.cli.app import app
 from msgflow.database import open_db
 from msgflow.errors import UsageError
+from msgflow.query.course import read_course
 from msgflow.result.query_result import QueryResult
 from msgflow.text.json_value import json_value
 from msgflow.view.page_query import Question
@@ -142,7 +144,11 @@ def explained(monkeypatch: pytest.MonkeyPatch) -> None:
         verdict=QueryResult(pa.Table.from_pylist(rows)),
         doubts=QueryResult(pa.table({"sentence": ["/a: its clock jumps"]})),
     )
-    monkeypatch.setattr("msgflow.view.summary.explain", lambda *_: found)
+
+    def explain(*asked: Any) -> SimpleNamespace:
+        return SimpleNamespace(course=read_course(*asked), **vars(found))
+
+    monkeypatch.setattr("msgflow.view.pages.explain", explain)
 
 
 @pytest.mark.usefixtures("explained")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum, StrEnum
+from enum import IntEnum
 from functools import cached_property
 from typing import Any
+
+from msgflow.backports import StrEnum
 
 BYTE = 8
 # Limits of what metadata may declare.

@@ -1,16 +1,22 @@
 -- description: The paths that e2e-latency and path-breakdown show, with the objects on them.
--- grain: one row per path
+-- grain: one row per printed path
 -- column: path_id BIGINT  Number of the path
 -- column: path VARCHAR  Nodes and topics
 -- column: topics
--- column: publishers BIGINT[]  Publishers in order
--- column: subscriptions
+-- column: publishers BIGINT[]  All publishers on it
+-- column: subscriptions BIGINT[]  All subscriptions on it
 -- column: is_cut BOOLEAN  The path goes on or has siblings beyond the limits of the search
 -- column: is_comparable BOOLEAN  The clocks of all its hosts were brought together, or are one
 WITH path AS MATERIALIZED (
-    SELECT path_id, path, topics, publishers, subscriptions, is_cut
-    FROM main.flow_path([$run], NULL, NULL)
-    WHERE is_path
+    SELECT
+        alike_id AS path_id,
+        path,
+        any_value(topics) AS topics,
+        list_sort(list_distinct(flatten(list(publishers)))) AS publishers,
+        list_sort(list_distinct(flatten(list(subscriptions)))) AS subscriptions,
+        bool_or(is_cut) AS is_cut
+    FROM main.flow_path([$run], only_paths := true)
+    GROUP BY alike_id, path
 ),
 visited AS (
     SELECT v.path_id, b.process_id
@@ -47,4 +53,4 @@ SELECT
     coalesce(t.is_comparable, true) AS is_comparable
 FROM path AS a
 LEFT JOIN timed AS t ON a.path_id = t.path_id
-ORDER BY a.path, a.path_id
+ORDER BY a.path

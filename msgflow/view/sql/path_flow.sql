@@ -1,6 +1,6 @@
 -- description: The flows that e2e-latency counts: the first arrival of each root, or why there is
 --     none. Kept by the page for its pictures of single paths.
--- grain: one row per path and root
+-- grain: one row per printed path and root
 -- param: start_ns
 -- column: path_id BIGINT  Number of the path
 -- column: root_kind, root_id, root_at
@@ -9,12 +9,18 @@
 --     on the way was stored until its subscription existed
 -- column: status VARCHAR  As in flows
 -- column: is_loss_affected BOOLEAN  A gap of a trace lies in its time
+WITH named_path AS MATERIALIZED (
+    SELECT path_id, alike_id FROM main.flow_path([$run], only_paths := true)
+)
 SELECT
-    path_id, root_kind, root_id,
+    alike_id AS path_id,
+    root_kind, root_id,
     root_ns - $origin_ns AS root_at,
     take_id,
     latency_ns AS latency,
     status, is_loss_affected
-FROM main.end_to_end([$run], NULL, NULL, 'callback_start', 'callback_end', $start_ns, $end_ns)
+FROM main.end_to_end(
+    [$run], window_start_ns := $start_ns, window_end_ns := $end_ns, paths := 'named_path'
+)
 WHERE is_first IS NOT false
 ORDER BY path_id, root_at, root_kind, root_id

@@ -12,6 +12,7 @@ import { NodesPage } from "./nodes.js";
 import { TopicsPage } from "./topics.js";
 import { Bar } from "./bar.js";
 import { ComparePage } from "./compare.js";
+import { WhatIfPage } from "./what_if.js";
 import { SqlPage } from "./sql.js";
 import { Follower } from "./follower.js";
 import { failed, waiting } from "./notice.js";
@@ -26,6 +27,7 @@ const PAGES = {
   nodes: ["Nodes", NodesPage],
   topics: ["Topics", TopicsPage],
   compare: ["Compare", ComparePage],
+  what_if: ["What if", WhatIfPage],
   sql: ["SQL", SqlPage],
 };
 // Pages that are sections of others: where their addresses lead, and what their own words are there.
@@ -36,7 +38,7 @@ const MOVED = {
   losses: ({ topic }) => ({ page: "topics", topic: null, lost: topic }),
 };
 // What only a server answers.
-const SERVED_PAGES = ["sql"];
+const SERVED_PAGES = ["sql", "what_if"];
 
 // What the server said in place of an answer.
 class SourceError extends Error {

@@ -10,7 +10,7 @@ import { NEAR_MARK, nearestMark } from "./marks.js";
 const LEAST_DRAG = 4;
 const MOST_FOUND = 8;
 // Pages whose numbers are of whole runs, or of what a query says.
-const WITHOUT_WINDOW = ["compare", "sql"];
+const WITHOUT_WINDOW = ["compare", "sql", "what_if"];
 const HOW_TO_CHOOSE = "drag to choose a window of time; a click shows the whole run";
 const FOUND_ON = {
   node: ["nodes", "q"],

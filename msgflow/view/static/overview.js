@@ -177,7 +177,8 @@ export class OverviewPage {
     // when somebody looks there: once all above has its height. A page that follows is whole.
     const isWhole = !app.source.isServed || app.follower;
     const courses = fill(changed, async () => {
-      if (!isWhole) await above;
+      // The verdict has found the changes, too.
+      if (!isWhole) await Promise.all([above, verdicts]);
       return courseSummary(await app.course(), await app.happened());
     });
     const below = [[nodes, "blame", blame], [drops, "drops", summary], [
@@ -236,20 +237,8 @@ export function doubted(table, paths, ids) {
   return (row) => apart.has(ids[row]);
 }
 
-// Which path of `paths` each row of a query is about: the same text, and where several paths bear
-// one, in the same order.
+// Which path of `paths` each row of a query is about.
 export function pathNumbers(table, paths) {
-  const known = new Map();
-  for (let row = 0; row < paths.rows; row++) {
-    const list = known.get(paths.path[row]) ?? [];
-    list.push(paths.path_id[row]);
-    known.set(paths.path[row], list);
-  }
-  const used = new Map();
-  return Array.from({ length: table.rows }, (_, row) => {
-    const list = known.get(table.path[row]) ?? [];
-    const position = used.get(table.path[row]) ?? 0;
-    used.set(table.path[row], position + 1);
-    return list[Math.min(position, list.length - 1)];
-  });
+  const known = new Map(Array.from(paths.path, (path, row) => [path, paths.path_id[row]]));
+  return Array.from(table.path, (path) => known.get(path));
 }

@@ -353,35 +353,7 @@ export class PathsPage {
     }
     if (!rows.length) return h("p", {}, "No flow reached the end of this path.");
     const most = Math.max(...rows.map((row) => Math.abs(breakdown.mean_ns[row])));
-    const whole = rows.reduce((sum, row) => sum + Math.max(breakdown.total_ns[row], 0), 0) || 1;
-    const stack = h("div", { className: "stack", role: "img", "aria-label": "stacked breakdown" });
-    const kinds = [...new Set(rows.map((row) => breakdown.part[row]))];
-    const shade = (kind) => PART_COLORS[kind] ?? "faint";
-    // A piece with a duration in it is as wide as that.
-    const least = Math.max(0.06, 70 / (this.root.clientWidth || 900));
-    for (const row of rows) {
-      const share = Math.max(breakdown.total_ns[row], 0) / whole;
-      const piece = h("span", {
-        className: `piece${share > least ? "" : " thin"}${
-          PALE.has(shade(breakdown.part[row])) ? " pale" : ""
-        }`,
-        title: `${partTitle(breakdown.part[row])} ${breakdown.what[row] ?? ""} in ${
-          breakdown.node[row] ?? "?"
-        }: ${duration(breakdown.mean_ns[row])} mean`,
-      }, share > least ? duration(breakdown.mean_ns[row]) : "");
-      piece.style.width = `${100 * share}%`;
-      piece.style.background = color(shade(breakdown.part[row]));
-      stack.append(piece);
-    }
-    const legend = h(
-      "div",
-      { className: "legend" },
-      kinds.map((kind) => {
-        const swatch = h("span", { className: "swatch" });
-        swatch.style.background = color(shade(kind));
-        return h("span", { className: "legend-item" }, swatch, partTitle(kind));
-      }),
-    );
+    const [stack, legend] = breakdownStack(breakdown, rows, this.root.clientWidth);
     return [
       h(
         "p",
@@ -458,4 +430,44 @@ function evenBins(histogram) {
     values.push(0);
   }
   return { low, count: values };
+}
+
+// The means of the parts of a path side by side; `whole` is as wide as the stack [ns].
+export function breakdownStack(breakdown, rows, width, whole = partsOf(breakdown, rows)) {
+  const stack = h("div", { className: "stack", role: "img", "aria-label": "stacked breakdown" });
+  const kinds = [...new Set(rows.map((row) => breakdown.part[row]))];
+  const shade = (kind) => PART_COLORS[kind] ?? "faint";
+  // A piece with a duration in it is as wide as that.
+  const least = Math.max(0.06, 70 / (width || 900));
+  const flows = Math.max(...rows.map((row) => breakdown.flows[row]), 1);
+  for (const row of rows) {
+    const share = Math.max(breakdown.total_ns[row], 0) / flows / (whole || 1);
+    const piece = h("span", {
+      className: `piece${share > least ? "" : " thin"}${
+        PALE.has(shade(breakdown.part[row])) ? " pale" : ""
+      }`,
+      title: `${partTitle(breakdown.part[row])} ${breakdown.what[row] ?? ""} in ${
+        breakdown.node[row] ?? "?"
+      }: ${duration(breakdown.mean_ns[row])} mean`,
+    }, share > least ? duration(breakdown.mean_ns[row]) : "");
+    piece.style.width = `${100 * share}%`;
+    piece.style.background = color(shade(breakdown.part[row]));
+    stack.append(piece);
+  }
+  const legend = h(
+    "div",
+    { className: "legend" },
+    kinds.map((kind) => {
+      const swatch = h("span", { className: "swatch" });
+      swatch.style.background = color(shade(kind));
+      return h("span", { className: "legend-item" }, swatch, partTitle(kind));
+    }),
+  );
+  return [stack, legend];
+}
+
+// The mean latency of the flows of a path [ns].
+export function partsOf(breakdown, rows) {
+  const flows = Math.max(...rows.map((row) => breakdown.flows[row]), 1);
+  return rows.reduce((sum, row) => sum + Math.max(breakdown.total_ns[row], 0), 0) / flows;
 }

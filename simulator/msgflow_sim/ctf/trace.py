@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING
 from uuid import UUID
@@ -117,7 +117,7 @@ class TraceWriter:
 
 
 def _environment(identity: TraceIdentity, tracer_minor: int) -> dict[str, str | int]:
-    created = datetime.fromtimestamp(identity.epoch_ns // _NANOSECONDS, UTC)
+    created = datetime.fromtimestamp(identity.epoch_ns // _NANOSECONDS, timezone.utc)
     scheme, buffering_id, process_name = identity.buffering
     common: dict[str, str | int] = {
         "trace_name": f"{identity.session}-{created:%Y%m%d%H%M%S}",
