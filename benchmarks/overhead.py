@@ -43,7 +43,7 @@ from msgflow.record import cpu_time, perf
 from msgflow.record.daemon import session_daemon
 from msgflow.record.perf import Rate, recorded_samples
 from msgflow.record.program import PYTHON_NODES
-from msgflow.record.recording import recorded_bytes
+from msgflow.record.recording import recorded_packets
 from msgflow.record.session import Channel, can_trace_kernel, recording_session
 
 _CHAIN = Path(__file__).parent / "recording" / "chain.py"
@@ -213,7 +213,8 @@ def _recorded(place: Path, *, is_recorded: bool, with_kernel: bool) -> Iterator[
         yield
         return
     place.mkdir()
-    with recording_session(_NAME, place, _CHANNEL, with_kernel=with_kernel):
+    of_kernel = perf.KERNEL_EVENTS if with_kernel else ()
+    with recording_session(_NAME, place, _CHANNEL, of_kernel=of_kernel):
         time.sleep(_UNTIL_KNOWN)
         yield
 
@@ -260,7 +261,7 @@ def _size(place: Path) -> tuple[int, int]:
     with trace.open(parts) as traces:
         for _ in traces.batches():
             pass
-        return sum(traces.event_counts.values()), recorded_bytes(place)
+        return sum(traces.event_counts.values()), recorded_packets(place)[0]
 
 
 def report(blocks: dict[str, list[Block]], draws: random.Random) -> None:

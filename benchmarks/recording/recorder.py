@@ -223,7 +223,7 @@ def session(directory: Path) -> Iterator[None]:
     with (
         one_at_a_time(),
         session_daemon(with_kernel=False, note=print),
-        recording_session("msgflow-real", directory, channel, with_kernel=False),
+        recording_session("msgflow-real", directory, channel),
     ):
         yield
 

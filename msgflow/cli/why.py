@@ -71,8 +71,8 @@ def command(
         with replay_progress() as progress:
             remedies = database.remedies(**asked, progress=progress)
         print_runs([remedies.run])
-        run: SliceWords = {"run": asked.get("run")}
-        lines = partial(remedy_lines, remedies, lambda words: _command(words, run, database.path))
+        whole: SliceWords = {"run": asked.get("run")}
+        lines = partial(remedy_lines, remedies, lambda words: _command(words, whole, database.path))
         print_sections(remedies.sections, form, output, None if wide else lines)
         for note in remedies.notes:
             print_note(note)
