@@ -450,7 +450,11 @@ def test_foreign_database_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("number", "message", "hint"),
     [
-        ("9999_more", "'9999_more', newer than", "upgrade msgflow, or ingest the traces into"),
+        (
+            "9999_more",
+            "'9999_more', which this msgflow does not know",
+            "upgrade msgflow if another one is newer, or ingest the traces into",
+        ),
         ("08", "08, from before the first release", "msgflow ingest TRACE --db NEW.duckdb reads"),
         ("0011", "0011, from before the first release", "msgflow ingest TRACE --db NEW.duckdb"),
     ],

@@ -211,7 +211,7 @@ def test_the_schemas_say_that_nothing_else_is_taken(small_database: Path) -> Non
             return await client.list_tools()
 
     tools = asyncio.run(talk()).tools
-    assert len(tools) == 10
+    assert len(tools) == 11
     assert all(tool.input_schema["additionalProperties"] is False for tool in tools)
 
 

@@ -7,7 +7,7 @@ import { dataTable } from "./table.js";
 import { command, failed, notes, waiting } from "./notice.js";
 import { breakdownStack, partsOf } from "./paths.js";
 
-const COLUMNS = [
+const COLUMNS_OF_REMEDIES = [
   "path",
   "recorded_ns",
   "predicted_ns",
@@ -153,7 +153,7 @@ export class WhatIfPage {
         {},
         h("h3", {}, "All paths"),
         dataTable(this.gains, {
-          columns: COLUMNS.filter((name) => name !== "doubt" || this.gains.doubt.some(Boolean)),
+          columns: COLUMNS_OF_REMEDIES.filter((name) => name !== "doubt" || this.gains.doubt.some(Boolean)),
           label: "what changes do to paths",
           sort: { name: "gain_ns", down: true },
           picked: (row) => this.gains.path[row] === this.path,

@@ -16,13 +16,19 @@ WITH seen AS MATERIALIZED (
         EXISTS (FROM store.executor_state WHERE run_id = $run_id) AS has_states,
         EXISTS (FROM store.request WHERE run_id = $run_id) AS has_requests,
         -- Those were enabled, and some client library or executor has none.
-        count(*) FILTER (name = 'process_without_rclcpp') > 0 AS is_without_rclcpp,
-        count(*) FILTER (name IN (
-            'executor_without_events', 'executor_events_left_out', 'agnocast_callbacks'
-        )) > 0
+        EXISTS (
+            FROM store.finding WHERE run_id = $run_id AND name = 'process_without_rclcpp'
+        ) AS is_without_rclcpp,
+        EXISTS (
+            FROM store.finding
+            WHERE run_id = $run_id
+                AND name IN (
+                    'executor_without_events', 'executor_events_left_out', 'agnocast_callbacks'
+                )
+        )
         OR EXISTS (FROM store.executor WHERE run_id = $run_id AND kind = 'events')
             AS is_without_executor
-    FROM store.finding
+    FROM store.run
     WHERE run_id = $run_id
 )
 SELECT

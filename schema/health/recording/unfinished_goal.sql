@@ -9,7 +9,7 @@
 -- next: query action-latency
 -- grain: one row per action server
 -- severity: warning
--- when: store.service WHERE ends_with(service_name, '/_action/get_result')
+-- when: store.service WHERE ends_with(service_name, '/_action/send_goal')
 WITH ended AS (
     SELECT
         action_server_id,

@@ -3,6 +3,8 @@
 --     it came, as far as the trace tells. One that a full queue dropped came, too. What calls
 --     the callback of a service or client comes to the negative number of that.
 -- grain: one row per publication and subscription that it came to
+-- param: begin_ns BIGINT  What begins earlier is left out
+-- param: until_ns BIGINT  What begins later is left out
 WITH message AS (
     SELECT
         d.publication_id, d.subscription_id, i.callback_instance_id,

@@ -6,6 +6,8 @@
 --     request or response has a negative number). Executors without events of their own
 --     have only that.
 -- grain: one row per callback instance that ended and is not nested in another
+-- param: begin_ns BIGINT  What begins earlier is left out
+-- param: until_ns BIGINT  What begins later is left out
 WITH state AS (
     SELECT
         s.executor_id, s.thread_id, s.state, s.start_ns,

@@ -3,6 +3,8 @@
 --     (end_ns). Requests and responses are messages, too: their numbers and those of their
 --     publishers are negative.
 -- grain: one row per publication of a known publisher, request and response
+-- param: begin_ns BIGINT  What begins earlier is left out
+-- param: until_ns BIGINT  What begins later is left out
 WITH cause AS (
     SELECT
         publication_id,

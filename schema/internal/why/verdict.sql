@@ -218,7 +218,8 @@ said AS (
                         THEN NULL
                     ELSE printf(
                         'data on %s are %s older by it on average',
-                        regexp_replace(path, ' → .+ → .+ → ', ' → … → '), main.duration_text(harm_ns)
+                        regexp_replace(path, ' → .+ → .+ → ', ' → … → '),
+                        main.duration_text(harm_ns)
                     )
                 END,
                 array_to_string(
