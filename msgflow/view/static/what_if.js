@@ -153,7 +153,9 @@ export class WhatIfPage {
         {},
         h("h3", {}, "All paths"),
         dataTable(this.gains, {
-          columns: COLUMNS_OF_REMEDIES.filter((name) => name !== "doubt" || this.gains.doubt.some(Boolean)),
+          columns: COLUMNS_OF_REMEDIES.filter((name) =>
+            name !== "doubt" || this.gains.doubt.some(Boolean)
+          ),
           label: "what changes do to paths",
           sort: { name: "gain_ns", down: true },
           picked: (row) => this.gains.path[row] === this.path,
