@@ -597,11 +597,14 @@ class Database:
             place: only paths that end at this topic or node; a glob is possible.
             changes: such as 'threads(/perception)=2' or 'duration(/detector on_image)*0.7'.
             run: a name or an id; the latest run when None.
-            keep: database to write, with the run and the same as it was replayed, to compare them.
+            keep: new database with the run and the same as it was replayed, to compare them.
 
         Raises:
-            UsageError: no such run, or a change that cannot be read, or that changes nothing.
+            UsageError: no such run, a change that cannot be read or that changes nothing, or a file
+                that exists.
         """
+        if keep is not None and Path(keep).exists():
+            raise UsageError(f"the file exists — {keep}", "another one: --keep FILE")
         from msgflow.replay.change import changed, read_change, require_effect
         from msgflow.replay.engine import Replay
         from msgflow.replay.predict import Predictor

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING
 
+from msgflow.backports import Unpack
 from msgflow.cli.operation import asks
 from msgflow.cli.output import Shown, print_result
 from msgflow.database import Database

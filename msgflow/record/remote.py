@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from msgflow.errors import RecordingError, TraceError, UsageError
+from msgflow.errors import MsgflowError, RecordingError, UsageError
 from msgflow.record.session import NETWORK_EVENTS, Channel, left_out
 from msgflow.trace.extraction import unpack
 
@@ -23,9 +23,9 @@ HOSTS = "hosts"
 
 _CONTAINER = "container:"
 # What ssh, docker or a shell could take for something else is no name.
-_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.@:-]*")
+_NAME = re.compile(r"(?:[A-Za-z0-9_][\w.-]*@)?[A-Za-z0-9_][\w.:-]*", re.ASCII)
 _EVENT = re.compile(r"[!-~]+")
-# Nobody is there to type a password. A machine that goes away is noticed.
+# It does not ask for a password, and notices when a machine goes away.
 _SSH = (
     "ssh",
     "-T",
@@ -77,7 +77,7 @@ def read_places(texts: Sequence[str]) -> list[Place]:
         is_container = text.startswith(_CONTAINER)
         name = target if is_container else target.rpartition("@")[2]
         if any(place.name == name for place in places):
-            raise UsageError(f"named twice — {name}", "each --on once")
+            raise UsageError(f"two places have one name — {name}", "each --on once")
         places.append(Place(name, target, is_container))
     return places
 
@@ -131,7 +131,7 @@ def fetched(
             continue
         try:
             session.fetch(directory / HOSTS / name)
-        except (RecordingError, TraceError) as error:
+        except MsgflowError as error:
             lose(name, error.message)
         except OSError as error:
             lose(name, (error.strerror or str(error)).lower())
@@ -177,6 +177,9 @@ class RemoteSession:
             unpack(archive, directory)
             if not any(directory.rglob("metadata")):
                 raise RecordingError("no process there has tracepoints", self.place.cure)
+        except BaseException:
+            shutil.rmtree(directory, ignore_errors=True)
+            raise
         finally:
             archive.unlink(missing_ok=True)
 

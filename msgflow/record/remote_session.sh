@@ -5,7 +5,7 @@
 # Behind a line "stop" it prints a tar archive of the recording. Wherever stdin ends, it ends all:
 # no session stays when the other side goes away.
 #
-# There is no single quote in here, and no backslash: any login shell passes it on as one word.
+# There is no single quote in here, and no backslash: any POSIX login shell passes it on as one word.
 set -u
 fail() {
     echo "Error: $1" >&2

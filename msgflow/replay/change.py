@@ -64,7 +64,7 @@ class _Kind:
 
     def text(self, value: float | str) -> str:
         if isinstance(value, str) or self.read is not _time:
-            return value if isinstance(value, str) else f"{value:.3g}"
+            return value if isinstance(value, str) else f"{value:.15g}"
         unit, size = next(each for each in _UNITS if int(value) % each[1] == 0)
         return f"{int(value) // size}{unit}"
 

@@ -90,7 +90,9 @@ class Callback:
     @property
     def topic(self) -> str:
         """The topic of its subscription; '': it has none."""
-        return self.label[len("Subscription(") : -1] if self.kind == "subscription" else ""
+        # Behind it a label may have the function.
+        label = self.label.partition(")")[0]
+        return label.removeprefix("Subscription(") if self.kind == "subscription" else ""
 
     def like(self, at: int, fires: bool | None, outputs: frozenset[int]) -> Instance | None:
         """The run whose message was published nearest to a time.

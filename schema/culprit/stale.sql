@@ -36,7 +36,8 @@ FROM (
     JOIN main.node AS n ON e.node_id = n.node_id
     JOIN main.timer AS t ON e.timer_id = t.timer_id
     JOIN callback_use AS c
-        ON n.full_name = c.node AND c.callback = printf('Subscription(%s)', e.topic_name)
+        ON n.full_name = c.node
+        AND starts_with(c.callback, printf('Subscription(%s)', e.topic_name))
     JOIN application_path AS a
         ON ends_with(a.path, printf(' → %s → %s', e.topic_name, n.full_name))
     WHERE t.period_ns >= 2 * c.period_ns

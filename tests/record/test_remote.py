@@ -333,7 +333,19 @@ def test_a_machine_that_goes_away_leaves_what_is_here(
 
 
 @pytest.mark.parametrize(
-    "word", ["-oProxyCommand=x", "a b", "", "container:", "container:-v", "a;b", "a\n", "$(x)"]
+    "word",
+    [
+        "-oProxyCommand=x",
+        "a b",
+        "",
+        "container:",
+        "container:-v",
+        "a;b",
+        "a\n",
+        "$(x)",
+        "robot@",
+        "user@..",
+    ],
 )
 def test_a_name_that_means_something_to_a_shell_is_refused(word: str) -> None:
     with pytest.raises(UsageError, match="not a machine"):
@@ -341,7 +353,7 @@ def test_a_name_that_means_something_to_a_shell_is_refused(word: str) -> None:
 
 
 def test_a_machine_is_named_once() -> None:
-    with pytest.raises(UsageError, match="named twice"):
+    with pytest.raises(UsageError, match="two places have one name"):
         read_places(["robot", "user@robot"])
 
 

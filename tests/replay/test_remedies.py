@@ -106,6 +106,8 @@ def test_what_is_kept_is_a_run_like_any_other(recorded, tmp_path):
     kept = tmp_path / "kept.duckdb"
     with msgflow.open_db(recorded) as database:
         found = database.predict(changes=["executor(/slow)=1"], keep=kept)
+        with pytest.raises(UsageError, match="the file exists"):
+            database.predict(keep=kept)
         unchanged = database.predict("/sink", keep=tmp_path / "same.duckdb")
         (was,) = database.query("e2e-latency", to="/sink").to_arrow().to_pylist()
     assert len(found) == 2

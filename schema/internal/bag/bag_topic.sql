@@ -2,7 +2,7 @@
 -- description: How many messages were published and taken by the recorder while the bag was
 --     recorded, how many it has, how many of those were joined to their publication, and why others
 --     were not. The recorder is the node rosbag2_recorder.
--- grain: one row per topic of the bag, and per other topic of which the recorder took messages
+-- grain: one row per topic of the bag, and per other topic that the recorder took messages on
 -- reads: bag_joined
 -- column: topic_name VARCHAR [topic]  Name of the topic
 -- column: published BIGINT  Messages published, as traced, from the first message of the bag to the

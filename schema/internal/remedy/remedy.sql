@@ -12,7 +12,7 @@
 -- column: function VARCHAR  Its function; NULL: not known
 -- column: topic_name VARCHAR [topic]  Topic whose messages it is about; NULL: none
 -- column: paths BIGINT  Paths that were asked for on which data come sooner
--- column: of_paths BIGINT  Paths that were asked for and of which a size can be said
+-- column: of_paths BIGINT  Paths that were asked for and that have a size
 -- column: gain_ns BIGINT [ns]  By how much the median is shorter, on average of `paths`
 -- column: low_ns BIGINT [ns]  Low end of its interval of 90 %
 -- column: high_ns BIGINT [ns]  High end

@@ -156,7 +156,7 @@ candidate (remedy, change, node, callback, topic_name, blamed_ns) AS (
         count(DISTINCT b.path) * (w.way_ns - i.way_ns)
     FROM way AS w
     JOIN breakdown AS b
-        ON w.node = b.node AND b.what = printf('Subscription(%s)', w.topic_name)
+        ON w.node = b.node AND starts_with(b.what, printf('Subscription(%s)', w.topic_name))
     CROSS JOIN (SELECT min(way_ns) AS way_ns FROM way WHERE is_within HAVING min(way_ns) > 0) AS i
     WHERE NOT w.is_within AND w.way_ns > i.way_ns
     GROUP BY w.node, b.what, w.topic_name, w.way_ns, i.way_ns

@@ -6,7 +6,7 @@
 -- column: path VARCHAR [path]  The path
 -- column: callbacks VARCHAR[]  Callbacks that messages lead to, in order
 -- column: median_ns, p95_ns, max_ns
--- column: bound_ns BIGINT [ns]  Sum of their bounds; NULL: one has none
+-- column: bound_ns BIGINT [ns]  Sum of their bounds; NULL: one has none that holds
 WITH hop AS (
     SELECT
         path_id, path,
@@ -31,7 +31,7 @@ SELECT
     any_value(p.median_ns) AS median_ns,
     any_value(p.p95_ns) AS p95_ns,
     any_value(p.max_ns) AS max_ns,
-    max(c.bound_ns) AS bound_ns
+    CASE WHEN count(*) = count(c.bound_ns) THEN max(c.bound_ns) END AS bound_ns
 FROM paths AS p
 JOIN chain AS c ON p.path = c.path
 GROUP BY p.path
