@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 _TEXT = re.compile(r"(?P<kind>\w+)\s*\((?P<place>.+)\)\s*(?P<operator>[=*])\s*(?P<value>\S.*)")
 _MODULE, _CLASS = re.compile(r"(?<!:):(?!:)"), re.compile(r"::|[:.]")
+# Threads, or messages in a queue; and ns.
+_MOST = 10_000
+_SHORTEST_PERIOD = 10_000
 _UNITS = (("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1_000), ("ns", 1))
 
 
@@ -53,7 +56,7 @@ class _Kind:
     Attributes:
         operator: stands before the value.
         value: an example of it.
-        read: returns the value that a text means; a ValueError says that it is none.
+        read: returns the value of a text, and raises a ValueError if the text has none.
         make: changes the callbacks that are chosen.
     """
 
@@ -63,7 +66,7 @@ class _Kind:
     make: Callable[[System, list[Callback], float | str], None]
 
     def text(self, value: float | str) -> str:
-        if isinstance(value, str) or self.read is not _time:
+        if isinstance(value, str) or self.read not in (_time, _period_time):
             return value if isinstance(value, str) else f"{value:.15g}"
         unit, size = next(each for each in _UNITS if int(value) % each[1] == 0)
         return f"{int(value) // size}{unit}"
@@ -117,7 +120,7 @@ def changed(system: System, changes: Iterable[Change]) -> System:
 def require_effect(system: System, change: Change) -> None:
     """Raise a UsageError if the system is as a change would have it."""
     other = changed(system, [change])
-    if (other.callbacks, other.executors) == (system.callbacks, system.executors):
+    if replace(other, names=system.names) == system:
         raise UsageError(f"it is so already — {change}", "msgflow why --fix says what may help")
 
 
@@ -249,7 +252,8 @@ def _with_instances(callback: Callback, other: Callable[[Instance], Instance]) -
 
 def _count(text: str) -> float:
     number = int(text)
-    if number < 1:
+    # More threads than any machine runs would take all memory of a replay.
+    if not 1 <= number <= _MOST:
         raise ValueError(text)
     return number
 
@@ -272,12 +276,19 @@ def _time(text: str) -> float:
     return duration_ns(text, "a change")
 
 
+def _period_time(text: str) -> float:
+    number = _time(text)
+    if number < _SHORTEST_PERIOD:
+        raise ValueError(text)
+    return number
+
+
 _KINDS: Mapping[str, _Kind] = {
     "executor": _Kind("=", "1", _count, _own_executor),
     "threads": _Kind("=", "2", _count, _threads),
     "duration": _Kind("*", "0.7", _factor, _duration),
     "depth": _Kind("=", "1", _count, _depth),
-    "period": _Kind("=", "20ms", _time, _period),
+    "period": _Kind("=", "20ms", _period_time, _period),
     "phase": _Kind("=", "5ms", _time, _phase),
     "way": _Kind("*", "0.5", _factor, _way),
     "awaits": _Kind("=", "0.9", _share, _awaits),

@@ -56,7 +56,7 @@ class Gain:
     """By how much a statistic of a path is shorter than without the changes [ns].
 
     Attributes:
-        size: on the average of what runs of the system may be like, but the best and the worst.
+        size: the mean over what runs of the system may be like, without the best and the worst.
         low: with 90 % of certainty, the size is not below; likewise `high`.
     """
 
@@ -309,6 +309,11 @@ def _reached(system: System, other: System) -> frozenset[int]:
     """The executors that a change can reach: of what is changed, and of what hears of that."""
     listeners: dict[int, set[int]] = defaultdict(set)
     reached = {key for key, each in other.executors.items() if system.executors.get(key) != each}
+    # Of what is published outside of callbacks, those that hear it at other times.
+    for (_, before), (_, after) in zip(system.outside, other.outside, strict=False):
+        if before != after:
+            heard = other.callbacks.keys() & after.delays.keys()
+            reached |= {other.callbacks[key].executor for key in heard}
     for one in (system, other):
         for key, each in one.callbacks.items():
             twin = other.callbacks.get(key) if one is system else system.callbacks.get(key)

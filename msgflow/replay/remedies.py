@@ -185,7 +185,7 @@ def _asked(
 def _doubts(predictor: Predictor, paths: Sequence[str]) -> Iterator[str]:
     """Yield for how many of the paths no size can be said, and why."""
     reasons: dict[str, int] = {}
-    for each in predictor.predict(rounds=0):
+    for each in predictor.predict(rounds=ROUNDS):
         if each.path in paths and each.doubt is not None:
             reasons[each.doubt] = reasons.get(each.doubt, 0) + 1
     for reason, number in sorted(reasons.items(), key=lambda item: -item[1]):

@@ -148,7 +148,10 @@ def test_a_busy_executor_makes_it_doubtful(tmp_path):
 def test_what_does_not_exist_cannot_be_changed(tmp_path):
     for change, said in (
         (Change("executor", "/slo", 1), "/slow"),
-        (Change("period", "/slow", 1), "callbacks"),
+        (Change("period", "/slow", 20_000_000), "callbacks"),
+        # They would never end, or take all memory.
+        (Change("period", "/sources Timer(10 ms)", 1), None),
+        (Change("threads", "/slow", 1e9), None),
         (Change("thread", "/slow", 2), "threads"),
         (Change("depth", "/often", 0), None),
     ):
