@@ -57,7 +57,7 @@ class Gain:
 
     Attributes:
         size: the mean over what runs of the system may be like, without the best and the worst.
-        low: with 90 % of certainty, the size is not below; likewise `high`.
+        low: nine of ten runs gain no less than this, and no more than `high`.
     """
 
     size: int

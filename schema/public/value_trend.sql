@@ -78,6 +78,7 @@ FROM line AS l
 JOIN coarse AS c ON l.what = c.what AND l.series_id = c.series_id
 JOIN best_step AS s ON l.what = s.what AND l.series_id = s.series_id
 WHERE abs(after - l.base) > main.least_change(l.what)
+    AND after >= 0
     AND greatest(l.base, after) > 1.3 * least(l.base, after)
 GROUP BY ALL
 HAVING sum((c.value - l.base - l.slopes[2] * (c.at_ns - l.at_ns)) ** 2) < any_value(s.error)

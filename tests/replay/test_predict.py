@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from support.robots import FAST, SINK, sources
 
 import msgflow
 from msgflow.errors import UsageError
@@ -19,30 +20,13 @@ from msgflow_sim import (
     Host,
     Node,
     Process,
-    Publisher,
     Scenario,
     Subscription,
-    Timer,
     Work,
 )
 from msgflow_sim import simulate as simulated
-from msgflow_sim.entity import MILLISECOND
 
-_SOURCES = Node(
-    "sources",
-    publishers=(Publisher("/often"), Publisher("/seldom")),
-    timers=(
-        Timer(10 * MILLISECOND, ("/often",), Work(100_000, 100_000)),
-        Timer(23 * MILLISECOND, ("/seldom",), Work(100_000, 100_000)),
-    ),
-)
-_FAST = Node(
-    "fast",
-    publishers=(Publisher("/answer"),),
-    subscriptions=(Subscription("/often", ("/answer",), Work(MILLISECOND, MILLISECOND)),),
-)
 _SLOW = Node("slow", subscriptions=(Subscription("/seldom", work=Work(9_000_000, 2_000_000)),))
-_SINK = Node("sink", subscriptions=(Subscription("/answer"),))
 
 
 def _system(layout: str, kind: str = "single_threaded", *, slow: Node = _SLOW) -> Scenario:
@@ -53,16 +37,16 @@ def _system(layout: str, kind: str = "single_threaded", *, slow: Node = _SLOW) -
         "Two nodes with one executor.",
         (Host("alpha", cpu_count=16),),
         (
-            Process("sources", "alpha", 1101, (_SOURCES,), client_library=library),
+            Process("sources", "alpha", 1101, (sources(10, 23),), client_library=library),
             Process(
                 "pair",
                 "alpha",
                 1201,
-                (_FAST, slow),
+                (FAST, slow),
                 executors=executors[: 1 + slow.executor],
                 client_library=library,
             ),
-            Process("sink", "alpha", 1301, (_SINK,)),
+            Process("sink", "alpha", 1301, (SINK,)),
         ),
         layout=layout,
         overwrites=True,

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from ruamel.yaml import YAML
+from support.robots import FAST, SINK, sources
 
 import msgflow
 from msgflow.errors import UsageError
@@ -20,30 +21,14 @@ from msgflow_sim import (
     Host,
     Node,
     Process,
-    Publisher,
     Scenario,
     Subscription,
-    Timer,
     Work,
 )
 from msgflow_sim import simulate as simulated
 from msgflow_sim.entity import MILLISECOND
 
-_SOURCES = Node(
-    "sources",
-    publishers=(Publisher("/often"), Publisher("/seldom")),
-    timers=(
-        Timer(50 * MILLISECOND, ("/often",), Work(100_000, 100_000)),
-        Timer(93 * MILLISECOND, ("/seldom",), Work(100_000, 100_000)),
-    ),
-)
-_FAST = Node(
-    "fast",
-    publishers=(Publisher("/answer"),),
-    subscriptions=(Subscription("/often", ("/answer",), Work(MILLISECOND, MILLISECOND)),),
-)
 _SLOW = Node("slow", subscriptions=(Subscription("/seldom", work=Work(45_000_000, 9_000_000)),))
-_SINK = Node("sink", subscriptions=(Subscription("/answer"),))
 
 
 def _database(folder: Path, name: str, slow: Node = _SLOW) -> Path:
@@ -53,15 +38,15 @@ def _database(folder: Path, name: str, slow: Node = _SLOW) -> Path:
         "Two nodes with one executor.",
         (Host("alpha", cpu_count=16),),
         (
-            Process("sources", "alpha", 1101, (_SOURCES,)),
+            Process("sources", "alpha", 1101, (sources(50, 93),)),
             Process(
                 "pair",
                 "alpha",
                 1201,
-                (_FAST, slow),
+                (FAST, slow),
                 executors=(Executor(), Executor())[: 1 + slow.executor],
             ),
-            Process("sink", "alpha", 1301, (_SINK,)),
+            Process("sink", "alpha", 1301, (SINK,)),
         ),
         layout="jazzy",
         overwrites=True,

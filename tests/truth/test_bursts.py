@@ -213,8 +213,8 @@ def test_a_clock_that_is_set_back_by_seconds_makes_none_wrong(
     ("recording", "factor", "least"),
     [
         thorough(Recording(lost_event_share=0.3), 0.3, 800),
-        # By four periods: all messages fit publications of four periods before as well. What comes
-        # behind the step, and what is beside that, does not tell of which time it is.
+        # By four periods: all messages fit publications of four periods before as well. Messages
+        # behind the step, or beside it, do not tell which of the two clocks they were sent by.
         (Recording(realtime_steps=((13 * SECOND // 10, -40_000_000),)), 0.3, 280),
         thorough(
             Recording(realtime_steps=((SECOND // 5, 7_000), (SECOND // 2, -40_000_000))), 1, 0

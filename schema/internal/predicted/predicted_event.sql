@@ -2,8 +2,8 @@
 -- title: What happens in a replay, in order
 -- description: Events as a recording would have them: the thread looks for work (1) and executes
 --     (2); the callback's message is taken (3), it begins (4), publishes (5), ends (6); its thread
---     waits (7), if it finds nothing more. What nothing that is replayed publishes happens on a
---     thread of its own.
+--     waits (7), if it finds nothing more. Messages that no replayed callback publishes
+--     have a thread of their own.
 -- grain: one row per event
 -- reads: replay_ran, replay_sent
 -- param: outside_id BIGINT  Thread of a process outside of its executors: so much above its id
