@@ -275,16 +275,6 @@ class Predictor:
         )
 
 
-def predict(
-    connection: duckdb.DuckDBPyConnection,
-    run: Run,
-    changes: Sequence[Change] = (),
-    rounds: int = ROUNDS,
-) -> list[Prediction]:
-    """Replay a run as it was and with changes; return what that does to each path."""
-    return Predictor(connection, run).predict(changes, rounds)
-
-
 def gain_of(gains: Sequence[int]) -> Gain:
     """Return what is said where drawn runs have these gains."""
     # One drawn run alone does not move it.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -13,7 +14,7 @@ from pathlib import Path
 import pytest
 from recording.recorder import NotPossibleError, one_at_a_time, require, ros_environment
 from recording.tracetools import build_tracetools
-from support.lttng_program import daemons, lttng
+from support.lttng_program import Ended, Record, daemons, lttng
 
 # `make` installs the wheels of ROS 2 there.
 ROS = Path(sys.prefix) / "ros" / "bin" / "python"
@@ -38,6 +39,32 @@ try:
 except (ExternalShutdownException, KeyboardInterrupt):
     pass
 """
+
+
+@pytest.fixture
+def record(tmp_path: Path) -> Record:
+    """Runs the command in an empty directory, and sends it a signal after some seconds."""
+
+    def run(*words: str, after: float | None = None, number: int = signal.SIGINT, **more) -> Ended:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "msgflow", "record", *words],
+            cwd=tmp_path,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            **more,
+        )
+        if after is not None:
+            time.sleep(after)
+            process.send_signal(number)
+        try:
+            out, err = process.communicate(timeout=120)
+        finally:
+            process.kill()
+        return Ended(process.returncode, out, err)
+
+    return run
 
 
 @pytest.fixture(autouse=True)

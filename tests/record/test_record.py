@@ -12,11 +12,10 @@ import sys
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from support.lttng_program import lttng
+from support.lttng_program import Record, lttng
 from support.terminal import Terminal
 from typer.testing import CliRunner, Result
 
@@ -25,44 +24,6 @@ from msgflow.database import Database
 from msgflow.record.perf import SCHEDULER_OPTIONS, why_not
 from msgflow.record.program import Program
 from msgflow.record.session import can_trace_kernel
-
-
-@dataclass
-class Ended:
-    """A command that is over."""
-
-    exit_code: int
-    out: str
-    err: str
-
-
-Record = Callable[..., Ended]
-
-
-@pytest.fixture
-def record(tmp_path: Path) -> Record:
-    """Runs the command in an empty directory, and sends it a signal after some seconds."""
-
-    def run(*words: str, after: float | None = None, number: int = signal.SIGINT, **more) -> Ended:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "msgflow", "record", *words],
-            cwd=tmp_path,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            **more,
-        )
-        if after is not None:
-            time.sleep(after)
-            process.send_signal(number)
-        try:
-            out, err = process.communicate(timeout=120)
-        finally:
-            process.kill()
-        return Ended(process.returncode, out, err)
-
-    return run
 
 
 @pytest.fixture

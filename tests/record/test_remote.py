@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from support.lttng_program import free_port
+from support.lttng_program import Record, free_port
 
 from msgflow.database import Database
 from msgflow.errors import UsageError
@@ -180,29 +180,13 @@ def two_nodes(machine: Machine, robot: list[str], tmp_path: Path) -> list[str]:
     return ["sh", str(tmp_path / "robot.sh")]
 
 
-def run(tmp_path: Path, *words: str, after: float | None = None, number: int = signal.SIGINT):
-    process = subprocess.Popen(
-        [sys.executable, "-m", "msgflow", "record", *words],
-        cwd=tmp_path,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    if after is not None:
-        time.sleep(after)
-        process.send_signal(number)
-    out, err = process.communicate(timeout=120)
-    return process.returncode, out, err
-
-
 def test_a_container_and_this_machine_are_one_recording(
-    container: Machine, two_nodes: list[str], tmp_path: Path
+    record: Record, container: Machine, two_nodes: list[str], tmp_path: Path
 ) -> None:
     words = ("--name", "drive", "--on", "container:arm", "--", *two_nodes)
-    code, out, err = run(tmp_path, *words)
-    assert code == 0, err
-    assert "/camera → /image → /detector → /objects → /camera" in out
+    ended = record(*words)
+    assert ended.exit_code == 0, ended.err
+    assert "/camera → /image → /detector → /objects → /camera" in ended.out
     with Database(tmp_path / "msgflow.duckdb") as database:
         # One clock: a container of this machine needs no messages for it.
         hosts = database.sql(
@@ -247,11 +231,11 @@ def test_no_session_stays_there(container: Machine, tmp_path: Path, number: sign
 
 
 def test_clocks_that_are_apart_come_together(
-    by_ssh: Machine, two_nodes: list[str], tmp_path: Path
+    record: Record, by_ssh: Machine, two_nodes: list[str], tmp_path: Path
 ) -> None:
     words = ("--no-ingest", "--name", "drive", "--on", "arm", "--", *two_nodes)
-    code, _, err = run(tmp_path, *words)
-    assert code == 0, err
+    ended = record(*words)
+    assert ended.exit_code == 0, ended.err
     assert by_ssh.is_clean()
 
     def later(found: re.Match[str]) -> str:
@@ -290,22 +274,23 @@ def test_clocks_that_are_apart_come_together(
 
 
 def test_a_machine_that_cannot_be_reached_ends_the_recording(
-    by_ssh: Machine, tmp_path: Path
+    record: Record, by_ssh: Machine
 ) -> None:
     for host, why in (("locked", "permission denied"), ("nowhere.invalid", "not resolve")):
         words = ("--name", "drive", "--on", host, "--on", "arm", "--", "sleep", "9")
-        code, _, err = run(tmp_path, *words)
-        assert code == 1, err
-        assert f"cannot record on {host}: " in err, err
-        assert why in err
+        ended = record(*words)
+        assert ended.exit_code == 1, ended.err
+        assert f"cannot record on {host}: " in ended.err
+        assert why in ended.err
         assert by_ssh.is_clean()
 
 
-def test_a_full_disk_there_is_said(container: Machine, tmp_path: Path) -> None:
+def test_a_full_disk_there_is_said(record: Record, container: Machine) -> None:
     fill = container.words("dd", "if=/dev/zero", "of=/tmp/full", "bs=1M")
     subprocess.run(fill, capture_output=True)
-    code, _, err = run(tmp_path, "--name", "drive", "--on", "container:arm", "--", "sleep", "9")
-    assert (code, "disk of /tmp is full" in err) == (1, True), err
+    ended = record("--name", "drive", "--on", "container:arm", "--", "sleep", "9")
+    assert ended.exit_code == 1, ended.err
+    assert "disk of /tmp is full" in ended.err
     assert container.is_clean()
 
 

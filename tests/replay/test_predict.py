@@ -13,7 +13,7 @@ import msgflow
 from msgflow.errors import UsageError
 from msgflow.ingest import ingest
 from msgflow.replay.change import Change
-from msgflow.replay.predict import Gain, Prediction, Predictor, Spread, gain_of, is_near, predict
+from msgflow.replay.predict import Gain, Prediction, Predictor, Spread, gain_of, is_near
 from msgflow.run.slice import Slice
 from msgflow_sim import (
     Executor,
@@ -59,7 +59,8 @@ def _asked(scenario: Scenario, folder: Path, changes: Sequence[Change] = ()) -> 
         simulated(scenario, folder / "trace", factor=0.3)
         ingest([folder / "trace"], database)
     with msgflow.open_db(database) as opened:
-        return predict(opened.connection, Slice().one_run(opened.connection, "a replay"), changes)
+        run = Slice().one_run(opened.connection, "a replay")
+        return Predictor(opened.connection, run).predict(changes)
 
 
 def _of(predictions: Sequence[Prediction], end: str) -> Prediction:

@@ -6,6 +6,20 @@ import os
 import socket
 import subprocess
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+@dataclass
+class Ended:
+    """A command that is over."""
+
+    exit_code: int
+    out: str
+    err: str
+
+
+Record = Callable[..., Ended]
 
 
 def lttng(*words: str) -> subprocess.CompletedProcess[str]:
